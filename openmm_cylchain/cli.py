@@ -181,13 +181,13 @@ def _run(options):
     if options.output is None:
         raise InputError("Say where the files of the run go: --output DIR, or give --dry-run.")
     try:
-        groups, linkers = run_with_summary(configuration, options.output, options.resume)
+        parts = run_with_summary(configuration, options.output, options.resume)
     except RunInterrupted as interruption:
         say("interrupted", interruption)
         raise SystemExit(128 + interruption.signal_number) from None
     directory = RunDirectory(options.output)
     print()
-    print(format_summary(configuration, groups, linkers))
+    print(format_summary(configuration, *parts))
     print(f"\nWritten to {directory.path}: {directory.summary.name}, {directory.figure.name}")
 
 

@@ -3,6 +3,8 @@
 Arguments and results are as in ``filament_shapes``.
 """
 
+from __future__ import annotations
+
 import warnings
 from dataclasses import dataclass
 

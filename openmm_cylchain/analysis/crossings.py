@@ -6,6 +6,8 @@ one plane, and they cross there if they meet within their lengths. Where all sta
 segments cross where an end of one goes through the inside of the other. Filaments with contacts that hold do not cross.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import product
@@ -154,7 +156,7 @@ class Pairs:
     second: IntArray
     shift: FloatArray
 
-    def where(self, wanted: BoolArray) -> "Pairs":
+    def where(self, wanted: BoolArray) -> Pairs:
         """Those that are wanted."""
         return Pairs(self.first[wanted], self.second[wanted], self.shift[wanted])
 

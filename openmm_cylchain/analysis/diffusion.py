@@ -1,5 +1,7 @@
 """Mean square displacements of filaments from an ``mdtraj.Trajectory``; arguments are as in ``filament_shapes``."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import mdtraj

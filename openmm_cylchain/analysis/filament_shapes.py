@@ -13,6 +13,8 @@ node come as a list with one array per filament, since filaments may differ in l
 InputError for a trajectory without filaments and for indices out of range.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import mdtraj

@@ -1,5 +1,7 @@
 """Moduli of networks and solutions from the fluctuations of their stress."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Networks of filaments: distances, contacts and bundles of filaments, mesh size, contraction against time."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Nematic order of segments: the tensor, its largest eigenvalue and the director."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from ..errors import InputError

@@ -1,5 +1,7 @@
 """A run as one object: times, filaments, linkers, energies; for mdtraj and MDAnalysis."""
 
+from __future__ import annotations
+
 import warnings
 from functools import cached_property
 from typing import Any
@@ -19,6 +21,7 @@ from ..output.read_tables import read_reports
 from ..output.record_file import read_records
 from ..output.run_description import DescribedLinkers, RunDescription
 from ..output.run_files import RunFiles
+from ..output.run_tables import MILLISECOND
 from ..units.quantities import VOLUME, positive, thermal_energy, whole_number
 from ..units.types import FloatArray, Indices, IntArray, Scalar
 from .run_filaments import PIECES_OF_ELEMENT, RunParticles, chain_of, described_filament
@@ -76,7 +79,7 @@ class Run:
         self.temperature = description.temperature
         self.time_step = description.time_step
         self.steps: IntArray = energies["step"][:frames].astype(int)
-        self.times: FloatArray = energies["time (ps)"][:frames]
+        self.times: FloatArray = MILLISECOND * energies["time (ms)"][:frames]
         self.energies: dict[str, FloatArray] = {name: values[:frames] for name, values in energies.items()}
         self.box: FloatArray | None = None if description.box is None else np.array(description.box)
         self.filaments = tuple(described_filament(own) for own in description.filaments)

@@ -4,6 +4,8 @@ A series is an array with time along its first axis. Where a second axis is allo
 copies (filaments, segments), which are pooled.
 """
 
+from __future__ import annotations
+
 import logging
 import math
 import warnings

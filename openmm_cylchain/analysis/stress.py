@@ -1,5 +1,7 @@
 """The stress of a network: the virial of chains, linkers, crosslinks and contacts, and the ideal part of nodes."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

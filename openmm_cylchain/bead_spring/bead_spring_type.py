@@ -1,5 +1,7 @@
 """BeadSpringType: an extensible, semiflexible chain of beads, and a preset for DNA by base pairs."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -153,7 +155,7 @@ class BeadSpringType(ChainType):
         temperature: Scalar,
         bead_friction: Scalar,
         bead_mass: Scalar = 650.0,
-    ) -> "BeadSpringType":
+    ) -> BeadSpringType:
         """The type with the parameters nu = kappa/lambda and T* = k_B T/(lambda d^2) of eq. (2) at a temperature.
 
         With a = d/(1 - 2 nu): lambda = k_B T/(T* d^2), K = lambda d and EI = nu lambda a^3.
@@ -192,7 +194,7 @@ class BeadSpringType(ChainType):
             bead_mass=bead_mass,
         )
 
-    def coarse_grained(self, beads: int) -> "BeadSpringType":
+    def coarse_grained(self, beads: int) -> BeadSpringType:
         """The same filament with one bead where there were ``beads``, eqs. (52) to (55).
 
         Spacing, friction and mass of a bead grow in proportion; EI and K, and so the extension under a force, stay.

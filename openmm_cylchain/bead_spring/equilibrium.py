@@ -4,6 +4,8 @@ Chains are open, with their short end bonds, and have any number of bonds N; the
 ``openmm.unit`` quantities or plain numbers in OpenMM's units; results are plain numbers or arrays in nm and kJ/mol.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
 from ..errors import InputError

@@ -7,6 +7,8 @@ Equation numbers refer to Panja, Barkema and van Leeuwen, PRE 2015, 92, 032603. 
 diagonalise all of the energy but the contour length: dR_p/dtau = -zeta_p R_p + DeltaH_p + G_p (46), exactly.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
 from ..errors import InputError

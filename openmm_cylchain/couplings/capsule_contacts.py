@@ -1,5 +1,7 @@
 """Contact of filaments whose segments are capsules: cylinders with round ends, without beads and without gaps."""
 
+from __future__ import annotations
+
 import math
 import warnings
 from typing import Any

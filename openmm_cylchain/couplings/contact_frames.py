@@ -1,5 +1,7 @@
 """The contacts of capsules at given positions: which segments overlap, where, and with which forces."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any

@@ -5,6 +5,8 @@ nonbonded forces act on them, with neighbour lists, periodic boxes and on every 
 move accordingly.
 """
 
+from __future__ import annotations
+
 import math
 import warnings
 from collections.abc import Collection

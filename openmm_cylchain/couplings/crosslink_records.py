@@ -1,5 +1,7 @@
 """Crosslinks as records in a file, and what they are in a frame of a trajectory."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

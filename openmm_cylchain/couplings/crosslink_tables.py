@@ -1,5 +1,7 @@
 """Tables of crosslinks, which never change, and those of them that this process knows by their identity."""
 
+from __future__ import annotations
+
 import hashlib
 import threading
 from collections import OrderedDict
@@ -151,7 +153,7 @@ class CrosslinkTable:
 
     def with_links(
         self, places: LinkPlaces, stiffness: float, rest_length: float, maximum_extension: float
-    ) -> "CrosslinkTable":
+    ) -> CrosslinkTable:
         """This table with further crosslinks of equal parameters, numbered on."""
         count = len(places)
         both = self.places.with_places(places)
@@ -168,12 +170,12 @@ class CrosslinkTable:
             np.concatenate([self.active, np.ones(count, dtype=bool)]),
         )
 
-    def without(self, numbers: IntArray) -> "CrosslinkTable":
+    def without(self, numbers: IntArray) -> CrosslinkTable:
         """This table without some crosslinks; raises InputError for a number that is not there or named twice."""
         rest = np.delete(np.arange(len(self)), self._rows_of(numbers, "removed"))
         return replace(self, **{name: getattr(self, name)[rest] for name in (*_COLUMNS, *_FURTHER)})
 
-    def switched(self, numbers: IntArray, active: bool) -> "CrosslinkTable":
+    def switched(self, numbers: IntArray, active: bool) -> CrosslinkTable:
         """This table with some crosslinks on or off; raises InputError as ``without`` does."""
         switched = np.array(self.active)
         switched[self._rows_of(numbers, "switched")] = active
@@ -194,7 +196,7 @@ class CrosslinkTable:
         np.savez(file, **self.__getstate__())
 
     @classmethod
-    def load(cls, file: str | Path | IO[bytes]) -> "CrosslinkTable":
+    def load(cls, file: str | Path | IO[bytes]) -> CrosslinkTable:
         """Read a table that ``save`` has written."""
         with np.load(file) as content:
             missing = {*_COLUMNS, "next_number"} - set(content.files)

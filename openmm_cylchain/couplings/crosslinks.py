@@ -14,6 +14,8 @@ does, on any platform. Which crosslinks there are belongs to each Context. A con
 so States and checkpoints say which belong to them, and one that comes from elsewhere cannot be taken for another.
 """
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np
@@ -104,7 +106,7 @@ class Crosslinks:
         self._store: LinkStore | None = None
 
     @classmethod
-    def from_system(cls, system: openmm.System) -> "list[Crosslinks]":
+    def from_system(cls, system: openmm.System) -> list[Crosslinks]:
         """The Crosslinks of a System that holds some, such as one that was read from XML.
 
         Returns
@@ -122,7 +124,7 @@ class Crosslinks:
         return found
 
     @classmethod
-    def of_force(cls, force: openmm.Force) -> "Crosslinks | None":
+    def of_force(cls, force: openmm.Force) -> Crosslinks | None:
         """The Crosslinks of a force of a System, or None if it is no force of crosslinks of one potential."""
         store = PortableLinks.of_force(force) or NativeLinks.of_force(force)
         return None if store is None else cls._of(store)

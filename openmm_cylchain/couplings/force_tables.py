@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from ..filaments.collection import FilamentCollection
 from ..output.run_files import RunFiles
-from ..output.run_tables import CONTACT_FORCE_COLUMNS, WALL_FORCE_COLUMNS, ReportTable
+from ..output.run_tables import ReportTable
 from .force_reporters import rows_of_contacts, rows_of_walls
 from .mean_forces import ContactForces, WallForces
 
@@ -14,8 +14,8 @@ class ForceTables:
 
     def __init__(self, files: RunFiles, walls: bool, contacts: bool, sizes: Sequence[int] | None = None) -> None:
         of_walls, of_contacts = (None, None) if sizes is None else sizes
-        self._walls = ReportTable(files.wall_forces, WALL_FORCE_COLUMNS, of_walls) if walls else None
-        self._contacts = ReportTable(files.contact_forces, CONTACT_FORCE_COLUMNS, of_contacts) if contacts else None
+        self._walls = ReportTable(files.wall_forces, of_walls) if walls else None
+        self._contacts = ReportTable(files.contact_forces, of_contacts) if contacts else None
 
     def write(
         self,

@@ -1,5 +1,7 @@
 """Joints: moments that hold the angle between two filaments of beam elements, or between one and a direction."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

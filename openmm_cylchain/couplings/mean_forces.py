@@ -1,5 +1,7 @@
 """Forces of walls and of contacts in a Context: their means over steps."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

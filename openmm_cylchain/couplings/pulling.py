@@ -1,5 +1,7 @@
 """Pulling: constant forces, constant tension, and tethers that move at constant velocity."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -217,7 +219,7 @@ class ConstantVelocityPulling(FilamentsReporter):
         ends = (nodes[0], nodes[-1]) if 2 * tether.node >= len(nodes) - 1 else (nodes[-1], nodes[0])
         return nodes[tether.node], *ends
 
-    def describeNextReport(self, simulation: "app.Simulation") -> dict[str, Any]:  # noqa: N802 - OpenMM's name
+    def describeNextReport(self, simulation: app.Simulation) -> dict[str, Any]:  # noqa: N802 - OpenMM's name
         """When the next report is due; puts the points where they belong if a run begins or goes on."""
         since = simulation.currentStep % self._interval * simulation.integrator.getStepSize()
         self._move(simulation.context, self._points_at((simulation.context.getTime() - since)._value))

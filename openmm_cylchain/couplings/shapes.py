@@ -1,5 +1,7 @@
 """Shapes that walls have: planes, slabs, spheres, cylinders, boxes and ellipsoids."""
 
+from __future__ import annotations
+
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -48,7 +50,7 @@ class Shape(ABC):
 
     @property
     @abstractmethod
-    def faces(self) -> "tuple[Face, ...]":
+    def faces(self) -> tuple[Face, ...]:
         """What the wall is made of: planes of a slab or box, in the order of the compiled engine, or itself."""
 
 
@@ -56,7 +58,7 @@ class Face(Shape):
     """A region with one face."""
 
     @property
-    def faces(self) -> "tuple[Face, ...]":
+    def faces(self) -> tuple[Face, ...]:
         return (self,)
 
     @abstractmethod

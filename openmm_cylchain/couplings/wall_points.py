@@ -1,5 +1,7 @@
 """Points at random on walls: motors of a gliding assay, or tethers, are anchored there."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

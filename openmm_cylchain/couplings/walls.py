@@ -4,6 +4,8 @@ A wall pushes back what is beyond it, with the energy ``(k/2) d^2`` for the dept
 ``wall_force`` is for every engine and platform, ``filament_wall_force`` for steps that walls do not limit.
 """
 
+from __future__ import annotations
+
 import re
 from collections.abc import Callable
 from typing import Any

@@ -10,7 +10,7 @@ import numpy as np
 from ..analysis.runs import Run
 from ..mechanics.geometry import unrolled
 from ..output.files import write_atomically
-from ..rendering.colors import WALL_COLOR, filament_colors, linker_color, particle_colors
+from ..rendering.colors import WALL_COLOR, filament_colors, linker_colors, particle_colors
 from ..units.text import time_unit
 from ..version import __version__
 from .drawn import check_path, spring_labels, thickness, visible_diameter, walls
@@ -82,9 +82,9 @@ def _types(run):
     agents: list[tuple[tuple[str, str | int], str, str, str]] = [
         (("filament", name), name, "FIBER", color) for name, color in filament_colors(run).items()
     ]
-    for kind, label in enumerate(spring_labels(run)):
-        agents.append((("linker", kind), label, "FIBER", linker_color(kind)))
-        agents.append((("hand", kind), f"{label}#hand", "SPHERE", linker_color(kind)))
+    for kind, (label, color) in enumerate(zip(spring_labels(run), linker_colors(run))):
+        agents.append((("linker", kind), label, "FIBER", color))
+        agents.append((("hand", kind), f"{label}#hand", "SPHERE", color))
     agents += [(("particle", name), name, "SPHERE", color) for name, color in particle_colors(run).items()]
     if run.walls:
         agents.append((("wall", 0), "wall", "FIBER", WALL_COLOR))

@@ -7,7 +7,7 @@ import numpy as np
 from ..analysis.runs import Run
 from ..mechanics.geometry import unrolled
 from ..output.files import write_atomically
-from ..rendering.colors import WALL_COLOR, filament_colors, linker_color, particle_colors
+from ..rendering.colors import WALL_COLOR, filament_colors, linker_colors, particle_colors
 from ..units.text import time_unit
 from .drawn import check_path, thickness, visible_diameter, walls
 
@@ -100,7 +100,7 @@ def write_vmd(run: Run, path: str | Path) -> None:
             "mol addrep $molecule",
         ]
     first = _FIRST_COLOR + len(filament_colors(run))
-    lines += [_color(first + kind, linker_color(kind)) for kind in range(len(run.spring_names))]
+    lines += [_color(first + kind, color) for kind, color in enumerate(linker_colors(run))]
     particle_color = first + len(run.spring_names) + 1
     for number, (name, color) in enumerate(particle_colors(run).items()):
         groups = [group for group in run.particles if group.name == name]

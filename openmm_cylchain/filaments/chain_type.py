@@ -3,6 +3,8 @@
 What depends on whether segments are straight, or bend inside, is in a SegmentKind.
 """
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -67,7 +69,7 @@ class ChainType(ABC):
 
     @property
     @abstractmethod
-    def segment_kind(self) -> "SegmentKind":
+    def segment_kind(self) -> SegmentKind:
         """What its segments are."""
 
     @property
@@ -273,7 +275,7 @@ class SegmentKind(ABC):
         center: FloatArray,
         normal: FloatArray,
         planar: bool,
-    ) -> "Points":
+    ) -> Points:
         """A ring without strains."""
 
     @abstractmethod
@@ -288,7 +290,7 @@ class SegmentKind(ABC):
         clamped: int | Indices,
         planar: bool,
         label: str,
-    ) -> "Points":
+    ) -> Points:
         """A free open chain in equilibrium."""
 
     @abstractmethod

@@ -1,5 +1,7 @@
 """One filament of a type at a place, and tethers of filaments."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,5 +1,7 @@
 """FilamentType: what a filament of cylinders is made of."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, cast
 
@@ -459,7 +461,7 @@ class FilamentType(ChainType):
             return self.segment_length
         return max(self.segment_length, self.friction_length)
 
-    def with_segment_length(self, segment_length: Scalar) -> "FilamentType":
+    def with_segment_length(self, segment_length: Scalar) -> FilamentType:
         """The same filament cut into segments of another length.
 
         Rescaled: k = EA/l0 if a stretching modulus was given; the stiffness of the joints, so that the persistence

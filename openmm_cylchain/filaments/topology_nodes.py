@@ -1,5 +1,7 @@
 """The filaments of a topology of mdtraj: their nodes, and whether they are rings."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +14,7 @@ if TYPE_CHECKING:
     import mdtraj
 
 
-def filament_nodes(trajectory_or_topology: "mdtraj.Trajectory | mdtraj.Topology") -> list[IntArray]:
+def filament_nodes(trajectory_or_topology: mdtraj.Trajectory | mdtraj.Topology) -> list[IntArray]:
     """Atom indices of the nodes of every filament, in order along the filament.
 
     Parameters
@@ -41,7 +43,7 @@ def filament_nodes(trajectory_or_topology: "mdtraj.Trajectory | mdtraj.Topology"
     return filaments
 
 
-def ring_filaments(trajectory_or_topology: "mdtraj.Trajectory | mdtraj.Topology") -> BoolArray:
+def ring_filaments(trajectory_or_topology: mdtraj.Trajectory | mdtraj.Topology) -> BoolArray:
     """Whether each filament is a ring: (filaments,) bool array."""
     topology = getattr(trajectory_or_topology, "topology", trajectory_or_topology)
     bonds = {frozenset((bond.atom1.index, bond.atom2.index)) for bond in topology.bonds}

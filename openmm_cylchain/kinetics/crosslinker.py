@@ -65,6 +65,11 @@ class Crosslinker:
         object.__setattr__(self, "stiffness", positive(self.stiffness, STIFFNESS, f"{label} stiffness"))
         object.__setattr__(self, "rest_length", non_negative(self.rest_length, LENGTH, f"{label} rest_length"))
 
+    @property
+    def is_motor(self) -> bool:
+        """Whether one of its hands walks."""
+        return any(hand.speed != 0.0 for hand in self.hands)
+
     def energy_at_reach(self, hand: Hand, temperature: Scalar) -> float:
         """The energy of the spring at the reach of a hand, in k_B T: beyond it nothing binds.
 

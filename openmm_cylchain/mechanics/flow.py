@@ -1,5 +1,7 @@
 """Flow of the solvent: uniform, shear, extension, and any other that is linear in space."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -69,14 +71,14 @@ class Flow:
             object.__setattr__(self, name, tuple(float(component) for component in components))
 
     @classmethod
-    def uniform(cls, velocity: Vector) -> "Flow":
+    def uniform(cls, velocity: Vector) -> Flow:
         """A flow with the same velocity everywhere."""
         return cls(velocity)
 
     @classmethod
     def shear(
         cls, rate: Scalar, direction: Vector = (1, 0, 0), gradient_direction: Vector = (0, 0, 1), origin: Vector = _REST
-    ) -> "Flow":
+    ) -> Flow:
         """Simple shear: u = rate (gradient_direction . (x - origin)) direction.
 
         Parameters
@@ -95,7 +97,7 @@ class Flow:
     @classmethod
     def extension(
         cls, rate: Scalar, direction: Vector = (1, 0, 0), compression: Vector = (0, 1, 0), origin: Vector = _REST
-    ) -> "Flow":
+    ) -> Flow:
         """Planar extension: u = rate (direction . r) direction - rate (compression . r) compression, r = x - origin.
 
         Parameters
@@ -122,7 +124,7 @@ class Flow:
             raise InputError(f"positions must have the shape (..., 3), but have {positions.shape}.")
         return flow_velocities(self, positions)
 
-    def __add__(self, other: "Flow") -> "Flow":
+    def __add__(self, other: Flow) -> Flow:
         """Both flows at once."""
         if not isinstance(other, Flow):
             return NotImplemented

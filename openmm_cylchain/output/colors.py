@@ -1,4 +1,20 @@
-"""Colors of pictures and figures: those of Okabe and Ito, which the color-blind can tell apart."""
+"""Colors of pictures and figures, which the color-blind can tell apart.
+
+Those of filaments are of Okabe and Ito; motors and crosslinkers differ from each other in hue and in lightness.
+"""
+
+from collections.abc import Sequence
 
 FILAMENT_COLORS = ("#0072B2", "#009E73", "#56B4E9", "#6B6B6B")
-LINKER_COLORS = ("#E69F00", "#D55E00", "#CC79A7", "#F0E442")
+_MOTOR_COLORS = ("#B3261E", "#CC79A7", "#6A3D9A")
+_CROSSLINKER_COLORS = ("#F2B200", "#8C6D31", "#C9C400")
+
+
+def spring_colors(motors: Sequence[bool]) -> list[str]:
+    """Colors of kinds of linkers that are motors or not: the first motor has one color in every run."""
+    colors, counts = [], [0, 0]
+    for motor in motors:
+        own = _MOTOR_COLORS if motor else _CROSSLINKER_COLORS
+        colors.append(own[counts[motor] % len(own)])
+        counts[motor] += 1
+    return colors

@@ -7,15 +7,18 @@ import numpy as np
 
 from ..errors import InputError
 from ..units.types import FloatArray
+from .run_tables import check_columns
 
 
 def read_table(path: Path) -> dict[str, FloatArray]:
-    """The columns of a table by their headers: a dict of (lines,) arrays; InputError if it is empty or damaged."""
+    """The columns of a table by their headers: a dict of (lines,) arrays; InputError if it is empty or damaged, or that
+    of a run with other columns."""
     # A kill may leave a part of the last line.
     with open(path, newline="") as file:
         lines = [line for line in file if line.endswith("\n")]
     if not lines:
         raise InputError(f"{path} is empty.")
+    check_columns(path, lines[0].rstrip("\r\n"))
     names = next(csv.reader(lines[:1]))
     try:
         values = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])

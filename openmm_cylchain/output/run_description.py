@@ -54,11 +54,13 @@ class DescribedFilament:
 
 @dataclass(frozen=True)
 class DescribedLinkers:
-    """A kind of linkers of a run: name, stiffness in kJ/(mol nm^2) and rest length in nm of their springs."""
+    """A kind of linkers of a run: name, stiffness in kJ/(mol nm^2) and rest length in nm of their springs; whether a
+    hand walks."""
 
     name: str
     stiffness: float
     rest_length: float
+    motor: bool = False
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from ..units.quantities import PICONEWTON
 from ..units.types import FloatArray
 from .dcd_frames import DCDFrames
 
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
     from openmm import app
 
 _DCD_HEADER_SIZE, _DCD_DATE, _DCD_TITLE_LINE = 92, 180, 80
+MILLISECOND = 1e9
+"""In ps."""
 
 
 def _open_at(path, size):
@@ -30,7 +33,9 @@ def _open_at(path, size):
 def size_of_lines(path: Path, step: int) -> tuple[int, int]:
     """The size of a ReportTable up to a step, and the number of its whole lines until then, but for the header."""
     with open(path, "rb") as file:
-        size, count = len(file.readline()), 0
+        header = file.readline()
+        check_columns(path, header.decode(errors="replace").rstrip("\r\n"))
+        size, count = len(header), 0
         for line in file:
             if not line.endswith(b"\n") or int(line.partition(b",")[0]) > step:
                 break
@@ -101,10 +106,10 @@ class TrajectoryFile:
 
 ENERGY_COLUMNS = (
     "step",
-    "time (ps)",
-    "stretching energy (kJ/mol)",
-    "bending energy (kJ/mol)",
-    "potential energy (kJ/mol)",
+    "time (ms)",
+    "stretching energy (pN nm)",
+    "bending energy (pN nm)",
+    "potential energy (pN nm)",
     "stretching energy per segment (kT)",
     "bending energy per joint (kT)",
     "mean end-to-end distance (nm)",
@@ -113,13 +118,13 @@ ENERGY_COLUMNS = (
 
 LINKER_TABLE_COLUMNS = (
     "step",
-    "time (ps)",
+    "time (ms)",
     "linkers",
     "unbound",
     "one hand bound",
     "both hands bound",
-    "mean tension (kJ/mol/nm)",
-    "maximum tension (kJ/mol/nm)",
+    "mean tension (pN)",
+    "maximum tension (pN)",
     "bindings",
     "unbindings",
 )
@@ -128,47 +133,84 @@ LINKER_TABLE_COLUMNS = (
 
 PULLING_TABLE_COLUMNS = (
     "step",
-    "time (ps)",
+    "time (ms)",
     "tether",
     "filament",
     "point x (nm)",
     "point y (nm)",
     "point z (nm)",
-    "force along the velocity (kJ/mol/nm)",
+    "force along the velocity (pN)",
     "extension along the velocity (nm)",
 )
 """A line per report and moving tether; the extension is that of the end-to-end vector that points to the tether."""
 
 
 _MEAN_FORCE_COLUMNS = (
-    "mean over (ps)",
-    "load (kJ/mol/nm)",
-    "force x (kJ/mol/nm)",
-    "force y (kJ/mol/nm)",
-    "force z (kJ/mol/nm)",
+    "mean over (ms)",
+    "load (pN)",
+    "force x (pN)",
+    "force y (pN)",
+    "force z (pN)",
 )
 
-WALL_FORCE_COLUMNS = ("step", "time (ps)", "wall", "face", *_MEAN_FORCE_COLUMNS)
+WALL_FORCE_COLUMNS = ("step", "time (ms)", "wall", "face", *_MEAN_FORCE_COLUMNS)
 """A line per report and face of a wall: its force on what it keeps in, and the sum of the sizes of its forces."""
 
-CONTACT_FORCE_COLUMNS = ("step", "time (ps)", "filament", *_MEAN_FORCE_COLUMNS)
+CONTACT_FORCE_COLUMNS = ("step", "time (ms)", "filament", *_MEAN_FORCE_COLUMNS)
 """A line per report and filament: the force of all contacts on it, and the sum of the sizes of their forces."""
 
 
-class ReportTable:
-    """A table of comma-separated values that is continued where the file has a given size; a new file if not given."""
+TABLE_COLUMNS = {
+    "energies.csv": ENERGY_COLUMNS,
+    "linkers.csv": LINKER_TABLE_COLUMNS,
+    "pulling.csv": PULLING_TABLE_COLUMNS,
+    "wall_forces.csv": WALL_FORCE_COLUMNS,
+    "contact_forces.csv": CONTACT_FORCE_COLUMNS,
+}
+"""Columns by the names of files."""
 
-    def __init__(self, path: Path, columns: Sequence[str], size: int | None = None) -> None:
+_SIZES = {"ms": MILLISECOND, "nm": 1.0, "pN": PICONEWTON, "pN nm": PICONEWTON, "kT": 1.0}
+# In OpenMM's units; but energies in kT come as such.
+
+
+def check_columns(path: Path, header: str) -> None:
+    """Raise InputError if a table has other columns, or other units, than it is written with."""
+    expected = ",".join(TABLE_COLUMNS.get(path.name, (header,)))
+    if header != expected:
+        raise InputError(
+            f"{path} was written by another version of openmm_cylchain: its columns are {header!r}, but now "
+            f"{expected!r}. Take that version, or run it again in another directory."
+        )
+
+
+class ReportTable:
+    """A table of comma-separated values that is continued where the file has a given size; a new file if not given.
+
+    Its columns are those of TABLE_COLUMNS.
+    """
+
+    def __init__(self, path: Path, size: int | None = None) -> None:
+        columns = TABLE_COLUMNS[path.name]
+        units = (name.partition("(")[2].rstrip(")") for name in columns[1:])
+        self._sizes = [_SIZES.get(name, 1.0) for name in units]
         if size is None:
             self._file = open(path, "w+b")
             self._file.write((",".join(columns) + "\n").encode())
         else:
             self._file = _open_at(path, size)
+            self._file.seek(0)
+            check_columns(path, self._file.readline().decode(errors="replace").rstrip("\r\n"))
             self._file.seek(0, os.SEEK_END)
 
     def write(self, step: int, values: Sequence[float]) -> None:
-        """Append a line: the step and a number for each further column (NaN where it has no meaning)."""
-        cells = (str(value) if isinstance(value, int) else repr(float(value)) for value in values)
+        """Append a line: the step and a number in OpenMM's units for each further column (NaN where it has no meaning).
+
+        Energies in kT come as such.
+        """
+        cells = (
+            str(value) if isinstance(value, int) else repr(float(value) / size)
+            for value, size in zip(values, self._sizes, strict=True)
+        )
         self._file.write(",".join([str(step), *cells]).encode() + b"\n")
         self._file.flush()
 

@@ -4,6 +4,8 @@ A PSF file is what VMD loads before a DCD or XTC trajectory, a LAMMPS data file 
 mdtraj does. They hold everything that is in the Topology, filaments and other molecules alike.
 """
 
+from __future__ import annotations
+
 import io
 import re
 from collections import Counter
@@ -37,7 +39,7 @@ _PSF_EMPTY_SECTIONS = (
 _ANGSTROM = 10.0  # in a nanometre
 
 
-def write_mmcif(topology: "app.Topology", positions: Vectors, file: TextFile) -> None:
+def write_mmcif(topology: app.Topology, positions: Vectors, file: TextFile) -> None:
     """Write an mmCIF file with the ids of chains and residues, which readers such as mdtraj find bonds by.
 
     It is that of ``openmm.app.PDBxFile`` with ``keepIds=True``, where ids can be read: chains whose id is blank, has
@@ -85,7 +87,7 @@ def _readable_ids(topology):
 
 
 def write_psf(
-    topology: "app.Topology",
+    topology: app.Topology,
     file: TextFile,
     system: openmm.System | None = None,
     masses: Numbers | None = None,
@@ -143,7 +145,7 @@ def _psf_atoms(topology, system, masses):
 
 
 def write_lammps_data(
-    topology: "app.Topology",
+    topology: app.Topology,
     positions: Vectors,
     file: TextFile,
     system: openmm.System | None = None,

@@ -1,7 +1,7 @@
 """Colors of what is in pictures of runs."""
 
 from ..analysis.runs import Run
-from ..output.colors import FILAMENT_COLORS, LINKER_COLORS
+from ..output.colors import FILAMENT_COLORS, spring_colors
 
 # Of linkers where colors of filaments are numbers.
 _GREYS = ("#333333", "#8A8A8A", "#5E5E5E", "#B0B0B0")
@@ -10,6 +10,7 @@ _GREYS = ("#333333", "#8A8A8A", "#5E5E5E", "#B0B0B0")
 _PARTICLES = ("#B9BDC6", "#D8B98A", "#9C8FB5", "#A9C4A0")
 
 WALL_COLOR = "#9EA3AD"
+PLUS_END_COLOR = "#101010"
 
 
 def filament_colors(run: Run) -> dict[str, str]:
@@ -24,7 +25,11 @@ def particle_colors(run: Run) -> dict[str, str]:
     return {name: _PARTICLES[number % len(_PARTICLES)] for number, name in enumerate(names)}
 
 
-def linker_color(kind: int, grey: bool = False) -> str:
-    """The color "#RRGGBB" of a kind of linkers, or of crosslinks."""
-    colors = _GREYS if grey else LINKER_COLORS
-    return colors[kind % len(colors)]
+def linker_colors(run: Run, grey: bool = False) -> list[str]:
+    """Colors "#RRGGBB" of the kinds in ``run.spring_names``."""
+    kinds = len(run.spring_names)
+    if grey:
+        return [_GREYS[kind % len(_GREYS)] for kind in range(kinds)]
+    # Crosslinks come last.
+    motors = [own.motor for own in run.linker_types]
+    return spring_colors([*motors, False][:kinds])

@@ -35,6 +35,9 @@ def add_command(commands):
     parser.add_argument("--whole", action="store_true", help="let filaments leave the periodic box")
     parser.add_argument("--no-linkers", action="store_true", help="leave linkers and crosslinks out")
     parser.add_argument("--no-particles", action="store_true", help="leave particles beside filaments out")
+    parser.add_argument(
+        "--hide", metavar="NAMES", help='residues that are left out, as in "HOH,NA"; water if not given, "" for none'
+    )
     parser.add_argument("--incomplete", action="store_true", help="draw a run that is not at its end")
     parser.set_defaults(command=_render)
 
@@ -47,7 +50,7 @@ def _render(options):
     from ..analysis.run_loading import load
     from ..output.progress import ProgressMessages
     from .pictures import View, write_film, write_picture
-    from .scene import Look
+    from .scene import WATER, Look
 
     look = Look(
         options.color,
@@ -56,6 +59,7 @@ def _render(options):
         not options.no_linkers,
         options.average,
         not options.no_particles,
+        WATER if options.hide is None else tuple(filter(None, options.hide.split(","))),
     )
     direction = None if options.view is None else _numbers(options.view, ",", 3, "--view")
     view = View(_size(options.size), options.projection, direction, options.turn)

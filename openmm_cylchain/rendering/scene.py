@@ -7,20 +7,25 @@ import matplotlib
 import numpy as np
 
 from ..analysis.order import director
+from ..analysis.run_filaments import RunParticles
 from ..analysis.runs import Run
 from ..errors import InputError
 from ..mechanics.geometry import segment_vectors
 from ..units.quantities import PICONEWTON
 from ..units.types import FloatArray, IntArray
-from .colors import filament_colors, linker_color, particle_colors
+from .colors import PLUS_END_COLOR, filament_colors, linker_colors, particle_colors
 from .outlines import box_edges, wall_lines
 from .tubes import Tubes
+
+WATER = ("HOH", "WAT", "SOL", "TIP3", "H2O")
+"""Names of residues of water."""
 
 COLORINGS = ("type", "tension", "orientation", "bending")
 
 _LINE_COLOR, _LINE_WIDTH = np.array([0.62, 0.64, 0.68]), 0.0011
 _VISIBLE = 0.009  # Of the extent of the scene: what a tube is wide at least.
 _VISIBLE_BALL = 0.012
+_PLUS_END = 0.75  # Of the diameter of a filament: the radius of the ball at its last node.
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,8 @@ class Look:
         Over how many frames a tension is averaged.
     particles : bool
         Whether particles beside filaments are drawn.
+    hidden : tuple of str
+        Names of residues that are not: of water if not given, which would cover all else.
     """
 
     color: str = "type"
@@ -49,6 +56,11 @@ class Look:
     linkers: bool = True
     average: int = 1
     particles: bool = True
+    hidden: tuple[str, ...] = WATER
+
+    def particles_of(self, run: Run) -> list[RunParticles]:
+        """The particles beside filaments that are drawn."""
+        return [own for own in run.particles if own.name not in self.hidden] if self.particles else []
 
     def __post_init__(self) -> None:
         if self.color not in COLORINGS:
@@ -103,18 +115,19 @@ class Scene:
             color = np.tile(_rgb(colors[own.type.name]), (len(ends), 1))
             if self.scale is not None and values is not None:
                 color = self.scale.colors(values[number])
+            if has_polarity(self.run) and not own.ring:
+                plus, _ = self._wrapped(np.repeat(points[-1:, None], 2, axis=1).astype(float))
+                parts.append(Tubes.of_one_kind(plus, _PLUS_END * self.diameters[number], _rgb(PLUS_END_COLOR)))
             ends, which = self._wrapped(ends)
             parts.append(Tubes.of_one_kind(ends, 0.5 * self.diameters[number], color[which]))
         if self.look.linkers:
             parts += self._linkers(frame)
-        if self.look.particles:
-            parts += self._balls(frame)
-        return Tubes.joined(parts)
+        return Tubes.joined(parts + self._balls(frame))
 
     def _balls(self, frame):
         colors, positions = particle_colors(self.run), self.run.positions(frame)
         parts = []
-        for own, diameter in zip(self.run.particles, self.ball_diameters):
+        for own, diameter in zip(self.look.particles_of(self.run), self.ball_diameters):
             balls, _ = self._wrapped(np.repeat(positions[own.indices][:, None], 2, axis=1).astype(float))
             parts.append(Tubes.of_one_kind(balls, 0.5 * diameter, _rgb(colors[own.name])))
         return parts
@@ -122,9 +135,9 @@ class Scene:
     def _linkers(self, frame):
         radius = 0.5 * float(np.median(self.diameters))
         parts = []
-        for kind in range(len(self.run.spring_names)):
+        for kind, name in enumerate(linker_colors(self.run, self.scale is not None)):
             lines, places = self.run.springs(frame, kind)
-            color = _rgb(linker_color(kind, self.scale is not None))
+            color = _rgb(name)
             springs, _ = self._wrapped(lines)
             hands, _ = self._wrapped(np.repeat(places[:, None], 2, axis=1))
             parts.append(Tubes.of_one_kind(springs, 0.55 * radius, color))
@@ -135,6 +148,11 @@ class Scene:
         if self.run.box is None or self.look.whole or not len(ends):
             return ends, np.arange(len(ends))
         return cut_at_faces(ends, self.run.box)
+
+
+def has_polarity(run: Run) -> bool:
+    """Whether the last nodes of filaments are marked: where motors walk to them."""
+    return any(own.motor for own in run.linker_types) and not all(own.ring for own in run.filaments)
 
 
 def cut_at_faces(ends: FloatArray, box: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -171,7 +189,7 @@ def make_scene(run: Run, look: Look, frames: list[int]) -> Scene:
         diameters = np.maximum(own, _VISIBLE * extent * own / own.max())
     else:
         diameters = own if look.diameter == 0.0 else np.full(len(own), look.diameter)
-    balls = [max(own.diameter, _VISIBLE_BALL * extent) for own in run.particles] if look.particles else []
+    balls = [max(own.diameter, _VISIBLE_BALL * extent) for own in look.particles_of(run)]
     # Tubes and balls stand out from the points by half their width.
     widest = max(diameters.max(), *balls) if balls else diameters.max()
     points = np.concatenate([points + 0.5 * widest, points - 0.5 * widest])
@@ -185,12 +203,13 @@ def legend_of(run: Run, look: Look) -> list[tuple[str, str, str]]:
     """Labels, colors "#RRGGBB" and kinds of what the legend of a picture has; see ``Scene``."""
     colors = filament_colors(run)
     legend = [(name, color, "filament") for name, color in colors.items()] if look.color == "type" else []
-    if look.particles:
-        legend += [(name, color, "particle") for name, color in particle_colors(run).items()]
+    if has_polarity(run):
+        legend.append(("last node (plus end)", PLUS_END_COLOR, "particle"))
+    shown = {own.name for own in look.particles_of(run)}
+    legend += [(name, color, "particle") for name, color in particle_colors(run).items() if name in shown]
     if look.linkers:
-        legend += [
-            (name, linker_color(kind, look.color != "type"), "linker") for kind, name in enumerate(run.spring_names)
-        ]
+        colors_of_linkers = linker_colors(run, look.color != "type")
+        legend += [(name, color, "linker") for name, color in zip(run.spring_names, colors_of_linkers)]
     return legend
 
 
@@ -200,9 +219,9 @@ def _framed_points(run, look, frames):
         return corners @ run.box
     sampled = {frames[round(place)] for place in np.linspace(0, len(frames) - 1, min(len(frames), 20))}
     points = np.concatenate([own for frame in sampled for own in run.curves(frame)])
-    if look.particles:
-        own = [run.positions(frame)[each.indices] for frame in sampled for each in run.particles]
-        points = np.concatenate([points, *own])
+    points = np.concatenate(
+        [points, *(run.positions(frame)[own.indices] for frame in sampled for own in look.particles_of(run))]
+    )
     return np.concatenate([points, *wall_lines(run, points)])
 
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from ..analysis.statistics import mean_with_error
 from ..output.read_tables import read_reports
-from ..units.quantities import PICONEWTON
 from .configuration import linker_labels
 
 
@@ -46,12 +45,12 @@ def _summarise_linkers(name, table):
         states[state.replace(" ", "_")] = mean
         states[f"{state.replace(' ', '_')}_error"] = error
     pulling = table["both hands bound"][late]
-    tensions = np.nan_to_num(table["mean tension (kJ/mol/nm)"][late])
-    largest = table["maximum tension (kJ/mol/nm)"]
+    tensions = np.nan_to_num(table["mean tension (pN)"][late])
+    largest = table["maximum tension (pN)"]
     largest = largest[~np.isnan(largest)]
     return LinkerSummary(
         name=name,
         **states,
-        mean_tension=float(np.average(tensions, weights=pulling)) / PICONEWTON if pulling.any() else None,
-        largest_tension=float(largest.max()) / PICONEWTON if len(largest) else None,
+        mean_tension=float(np.average(tensions, weights=pulling)) if pulling.any() else None,
+        largest_tension=float(largest.max()) if len(largest) else None,
     )

@@ -20,13 +20,7 @@ from ..errors import InputError, InstabilityError
 from ..mechanics.broken_segment import find_broken_segment
 from ..output.linker_records import LinkerFile, measure_linkers
 from ..output.progress import RunProgress
-from ..output.run_tables import (
-    ENERGY_COLUMNS,
-    LINKER_TABLE_COLUMNS,
-    PULLING_TABLE_COLUMNS,
-    ReportTable,
-    TrajectoryFile,
-)
+from ..output.run_tables import ReportTable, TrajectoryFile
 from ..systems.described_runs import energy_cells, total_energies, write_topology
 from ..systems.refused_context import refusal
 from ..systems.step_check import check_time_step
@@ -304,14 +298,14 @@ class Recorder:
             begun and begun.trajectory_size,
             begun.trajectory_header if begun else b"",
         )
-        self._energies = ReportTable(self._directory.energies, ENERGY_COLUMNS, begun and begun.energies_size)
+        self._energies = ReportTable(self._directory.energies, begun and begun.energies_size)
         files = [self._trajectory, self._energies]
         if self._filaments.linkers:
-            self._linkers = ReportTable(self._directory.linkers, LINKER_TABLE_COLUMNS, begun and begun.linkers_size)
+            self._linkers = ReportTable(self._directory.linkers, begun and begun.linkers_size)
             self._places = LinkerFile(self._directory.linker_places, begun and begun.linker_records)
             files += [self._linkers, self._places]
         if self._moving:
-            self._pulling = ReportTable(self._directory.pulling, PULLING_TABLE_COLUMNS, begun and begun.pulling_size)
+            self._pulling = ReportTable(self._directory.pulling, begun and begun.pulling_size)
             files.append(self._pulling)
         self._forces = ForceTables(self._directory, *self._has_forces, begun and begun.force_sizes)
         files.append(self._forces)

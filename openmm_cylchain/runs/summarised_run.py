@@ -1,6 +1,7 @@
 """A run with its summary and figure: what the command ``run`` does, and each run of a scan."""
 
 from .linker_summary import summarise_linkers
+from .measures import measure
 from .run import run
 from .run_directory import RunDirectory
 from .summary import load_trajectory, summarise
@@ -11,14 +12,15 @@ from .summary_text import write_summary
 def run_with_summary(configuration, output, resume=False):
     """Run a configuration to its end, and write its summary and figure; see ``run`` for arguments and errors.
 
-    Returns lists of GroupSummary and of LinkerSummary.
+    Returns lists of GroupSummary, LinkerSummary and Measure.
     """
     run(configuration, output, resume)
     directory = RunDirectory(output)
     trajectory = load_trajectory(configuration, directory)
     groups = summarise(configuration, trajectory)
     linkers = summarise_linkers(configuration, directory)
+    measures = measure(configuration, directory)
     # The summary comes last: a run that has one is complete.
     write_figure(configuration, directory, trajectory)
-    write_summary(configuration, directory, groups, linkers)
-    return groups, linkers
+    write_summary(configuration, directory, groups, linkers, measures)
+    return groups, linkers, measures

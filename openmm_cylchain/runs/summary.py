@@ -20,7 +20,7 @@ from ..filaments.equilibrium import SegmentLengthDistribution
 from ..filaments.straight_segments import STRAIGHT_SEGMENTS
 from ..output.dcd_frames import DCDFrames
 from ..theory import beam_elements
-from ..units.quantities import thermal_energy
+from ..units.quantities import PICONEWTON, thermal_energy
 from .silence import silenced_c_library
 
 _STRETCHING, _STRETCHING_OF_ELEMENTS = "stretching energy per segment", "stretching energy per element"
@@ -29,6 +29,7 @@ _EXTENSION = "extension along the tension, second half of the run"
 _ROUNDING_OF_STRETCHING, _ROUNDING_OF_ALL = 0.01, 1.0
 """Beyond which share of its thermal energy, that of stretching, or nothing at all, is compared with theory."""
 _ENOUGH_FILAMENTS = 8
+NOT_COMPARABLE = "not comparable"
 AGREEMENT_SIGMA = 3.0
 AGREEMENT_FRACTION = 0.05
 _DISTURBANCES = {
@@ -108,6 +109,9 @@ def group_labels(configuration):
         f"{group.type.segment_kind.name}{'s' * (group.segments > 1)}"
         for group in configuration.filaments
     ]
+    if len(set(labels)) < len(labels) and all(group.tension for group in configuration.filaments):
+        tensions = [f"{group.tension[0] / PICONEWTON:.3g} pN" for group in configuration.filaments]
+        labels = [f"{label}, {tension}" for label, tension in zip(labels, tensions)]
     if len(set(labels)) < len(labels):
         labels = [f"{label} (table {group.table})" for label, group in zip(labels, configuration.filaments)]
     return labels
@@ -138,7 +142,7 @@ def _summarise_group(configuration, group, members, label, trajectory):
     comparable = is_in_equilibrium(group) and rounding <= _ROUNDING_OF_ALL
     temperature = configuration.solvent.temperature
     for name, unit, series, exact in _series(group, temperature, trajectory, members):
-        value, error = _mean_with_error(series)
+        value, error = mean_over_filaments(series)
         slow = len(members) < _ENOUGH_FILAMENTS and statistical_inefficiency(series) > len(series) / 10
         if slow and name != _WORMLIKE:
             short.append(name)
@@ -146,7 +150,7 @@ def _summarise_group(configuration, group, members, label, trajectory):
         observables.append(_compared(name, unit, value, error, exact, comparable and not rounded))
     if has_exact_extension(group):
         series = extensions(group, trajectory, members)
-        value, error = _mean_with_error(series)
+        value, error = mean_over_filaments(series)
         exact = float(theory.chain_extension(group.type, group.segments, group.tension[0], temperature))
         observables.append(_compared(_EXTENSION, "nm", value, error, exact, rounding <= _ROUNDING_OF_ALL))
     observables += _persistence_length(group, temperature, trajectory, members, comparable)
@@ -256,7 +260,8 @@ def _end_to_end(group, temperature, trajectory, members):
         yield _WORMLIKE, "nm^2", squares, float(wormlike)
 
 
-def _mean_with_error(series):
+def mean_over_filaments(series):
+    """The mean of (frames, filaments) values and its error: over filaments, or in time if they are few."""
     filaments = series.shape[1]
     if filaments >= _ENOUGH_FILAMENTS:
         means = series.mean(axis=0)
@@ -291,7 +296,7 @@ def _persistence_length_of_cylinders(group, trajectory, members):
 
 def _persistence_length_of_beams(group, trajectory, members):
     # -h/ln<c> of the cosine c between tangents at the ends of an element, half of it in a plane, and its error.
-    cosine, error = _mean_with_error(np.stack(joint_cosines(trajectory, members), axis=1).mean(axis=2))
+    cosine, error = mean_over_filaments(np.stack(joint_cosines(trajectory, members), axis=1).mean(axis=2))
     if not 0.0 < cosine < 1.0:
         return None
     length = group.type.segment_length / (2.0 if group.planar else 1.0)
@@ -310,7 +315,7 @@ def _compared(name, unit, value, error, exact, comparable):
     deviation = difference / error if error > 0 else None
     relative = difference / exact if abs(exact) > 1e-6 else None
     if not comparable:
-        verdict = "not comparable"
+        verdict = NOT_COMPARABLE
     elif name == _WORMLIKE:
         verdict = "reference"
     elif deviation is not None and abs(deviation) <= AGREEMENT_SIGMA:

@@ -10,17 +10,21 @@ from matplotlib.figure import Figure
 
 from .. import theory
 from ..analysis.bending import joint_cosines, tangent_correlation
-from ..analysis.filament_shapes import filament_curves, segment_lengths
+from ..analysis.filament_shapes import segment_lengths
 from ..analysis.statistics import mean_with_error
 from ..filaments.straight_segments import STRAIGHT_SEGMENTS
-from ..mechanics.geometry import unrolled
-from ..output.colors import FILAMENT_COLORS, LINKER_COLORS
+from ..output.colors import FILAMENT_COLORS, spring_colors
 from ..output.files import write_atomically
+from ..output.linker_records import LINKER_RECORD
 from ..output.read_tables import read_reports, read_table
 from ..output.record_file import read_records
+from ..output.run_tables import MILLISECOND
 from ..units.quantities import PICONEWTON, thermal_energy
 from ..units.text import time_unit
 from .configuration import linker_labels
+from .conformations import Conformations
+from .figure_style import FONT_SIZE, legend, legend_below, length_unit
+from .measures import course
 from .summary import (
     extensions,
     group_labels,
@@ -32,19 +36,19 @@ from .summary import (
 _COLOURS = (*FILAMENT_COLORS, "#CC79A7", "#000000")
 _EXACT_COLOUR = "0.25"  # Of a line that is that of several kinds of filaments.
 _STRETCHING_COLOUR, _BENDING_COLOUR = "#D55E00", "#0072B2"
-_FONT_SIZE = 11
 _LEAST_ANGLE = 1e-9
 
 
 def write_figure(configuration, directory, trajectory):
     """Draw the figure of a run into its directory as PNG; see ``summary.load_trajectory``."""
+    network = course(configuration, directory)
     # Titles and names are of users: "$" is no mathematics in them.
     with rc_context({"text.parse_math": False}):
-        image = _draw(configuration, directory, trajectory)
+        image = _draw(configuration, directory, trajectory, network)
     write_atomically(directory.figure, image)
 
 
-def _draw(configuration, directory, trajectory):
+def _draw(configuration, directory, trajectory, network):
     has_forces = bool(configuration.walls or configuration.contacts)
     rows = 2 + bool(configuration.linkers) + has_forces
     figure = Figure(figsize=(12, 4.75 * rows), layout="constrained")
@@ -52,7 +56,7 @@ def _draw(configuration, directory, trajectory):
     figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12, hspace=0.03, wspace=0.03)
     axes = figure.subplots(rows, 2)
     if configuration.title:
-        figure.suptitle(configuration.title, fontsize=_FONT_SIZE + 3)
+        figure.suptitle(configuration.title, fontsize=FONT_SIZE + 3)
     groups = [
         (group, list(members), label, _COLOURS[number % len(_COLOURS)])
         for number, (group, members, label) in enumerate(
@@ -60,39 +64,48 @@ def _draw(configuration, directory, trajectory):
         )
     ]
     temperature = configuration.solvent.temperature
-    _draw_conformations(axes[0, 0], groups, trajectory)
-    _draw_energies(axes[0, 1], groups, temperature, read_table(directory.energies))
-    _draw_tangent_correlation(axes[1, 0], groups, temperature, trajectory)
-    if any(has_exact_extension(group) for group, *_ in groups):
-        _draw_extensions(axes[1, 1], groups, temperature, trajectory)
-    elif any(group.joints for group, *_ in groups):
-        _draw_joint_angles(axes[1, 1], groups, temperature, trajectory)
+    energies = read_table(directory.energies)
+    labels = linker_labels(configuration)
+    colours = spring_colors([own.kind.is_motor for own in configuration.linkers])
+    conformations = Conformations(
+        configuration,
+        [(group, members, _COLOURS[(group.table - 1) % len(_COLOURS)]) for group, members, *_ in groups],
+        trajectory,
+        read_records(directory.linker_places) if configuration.linkers else np.zeros(0, LINKER_RECORD),
+        list(zip(labels, colours)),
+        (0, -1) if network else (-1,),
+        any(own.kind.is_motor for own in configuration.linkers) or any(group.propulsion for group, *_ in groups),
+    )
+    if network:
+        # Theory is that of free filaments: what they do together says more.
+        conformations.draw(axes[0, 0], 0)
+        conformations.draw(axes[0, 1], -1)
+        _draw_course(axes[1, 0], network)
+        _draw_energies(axes[1, 1], groups, temperature, energies)
     else:
-        _draw_segment_lengths(axes[1, 1], groups, temperature, trajectory)
+        conformations.draw(axes[0, 0], -1)
+        _draw_energies(axes[0, 1], groups, temperature, energies)
+        _draw_tangent_correlation(axes[1, 0], groups, temperature, trajectory)
+        if any(has_exact_extension(group) for group, *_ in groups):
+            _draw_extensions(axes[1, 1], groups, temperature, trajectory)
+        elif any(group.joints for group, *_ in groups):
+            _draw_joint_angles(axes[1, 1], groups, temperature, trajectory)
+        else:
+            _draw_segment_lengths(axes[1, 1], groups, temperature, trajectory)
     if configuration.linkers:
-        labels, table = linker_labels(configuration), read_reports(directory.linkers)
-        _draw_linkers(axes[0, 0], labels, directory.linker_places)
-        _draw_numbers_bound(axes[2, 0], labels, table)
-        _draw_tensions(axes[2, 1], labels, table)
+        table = read_reports(directory.linkers)
+        _draw_numbers_bound(axes[2, 0], labels, colours, table)
+        _draw_tensions(axes[2, 1], labels, colours, table)
     if has_forces:
         _draw_forces(axes[-1], configuration, directory, trajectory.time)
     for axis in axes.flat:
-        axis.title.set_fontsize(_FONT_SIZE + 1)
-        axis.xaxis.label.set_fontsize(_FONT_SIZE)
-        axis.yaxis.label.set_fontsize(_FONT_SIZE)
-        axis.tick_params(labelsize=_FONT_SIZE - 1)
+        axis.title.set_fontsize(FONT_SIZE + 1)
+        axis.xaxis.label.set_fontsize(FONT_SIZE)
+        axis.yaxis.label.set_fontsize(FONT_SIZE)
+        axis.tick_params(labelsize=FONT_SIZE - 1)
     image = io.BytesIO()
     figure.savefig(image, format="png", dpi=130)
     return image.getvalue()
-
-
-def _legend(axis, **options):
-    axis.legend(fontsize=_FONT_SIZE - 1, framealpha=0.85, edgecolor="none", **options)
-
-
-def _legend_below(axis):
-    # Where there are too many lines to leave room for it.
-    _legend(axis, loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
 
 
 def _draw_histogram(axis, values, label, colour):
@@ -105,96 +118,32 @@ def _time_unit(time):
     return name.replace("us", "µs"), length
 
 
-def _length_unit(length):
-    return ("µm", 1e3) if length >= 1e3 else ("nm", 1.0)
+def _times(column):
+    # A column of times in ms, in the unit that is named.
+    name, length = _time_unit(MILLISECOND * column[-1])
+    return name, MILLISECOND * column / length
 
 
-def _draw_conformations(axis, groups, trajectory):
-    last = trajectory[-1]
-    for group, members, label, colour in groups:
-        for number, positions in enumerate(filament_curves(last, members)):
-            points = unrolled(positions[0]) if group.closed else positions[0]
-            axis.plot(
-                points[:, 0],
-                points[:, 1],
-                color=colour,
-                linewidth=1.8,
-                solid_capstyle="round",
-                label=label if number == 0 else None,
-            )
-    axis.set_aspect("equal", adjustable="datalim")
-    axis.margins(0.08)
-    axis.set_xticks([])
-    axis.set_yticks([])
-    for spine in axis.spines.values():
-        spine.set_color("0.7")
-    name, length = _time_unit(trajectory.time[-1])
-    axis.set_title(f"Filaments at {trajectory.time[-1] / length:.4g} {name}, projected on the xy plane")
-    _legend_of_conformations(axis)
-    _draw_scale_bar(axis)
+def _draw_course(axis, network):
+    name, time = _times(network.times)
+    for number, (label, values) in enumerate(network.shares.items()):
+        axis.plot(time, values, ("-", "--", "-.", ":")[number], color=_COLOURS[number], linewidth=1.6, label=label)
+    axis.set_xlim(time[0], time[-1])
+    axis.set_ylim(0.0, 1.05 * axis.dataLim.y1)
+    axis.set_xlabel(f"time ({name})")
+    axis.set_title("All filaments together")
+    legend(axis, loc="upper center", bbox_to_anchor=(0.5, -0.15))
 
 
-def _legend_of_conformations(axis):
-    # Below the frame, beside the scale bar.
-    _legend(axis, loc="upper left", bbox_to_anchor=(0.0, -0.01), borderaxespad=0.0)
-
-
-def _draw_scale_bar(axis):
-    # As long as a round number that is closest below a quarter of the width, below the frame on the right.
-    axis.apply_aspect()
-    width = np.diff(axis.get_xlim())[0]
-    decade = 10.0 ** np.floor(np.log10(width / 4))
-    length = max(step * decade for step in (1, 2, 5) if step * decade <= width / 4)
-    unit, scale = _length_unit(length)
-    transform = axis.transAxes
-    fraction = length / width
-    axis.plot(
-        [1.0 - fraction, 1.0],
-        [-0.03, -0.03],
-        color="black",
-        linewidth=3,
-        transform=transform,
-        clip_on=False,
-        solid_capstyle="butt",
-    )
-    axis.text(
-        1.0 - fraction / 2,
-        -0.045,
-        f"{length / scale:g} {unit}",
-        transform=transform,
-        ha="center",
-        va="top",
-        fontsize=_FONT_SIZE,
-    )
-
-
-def _draw_linkers(axis, labels, path):
-    # Those that join two places in the last frame, in front of the filaments.
-    records = read_records(path)
-    last = records[records["step"] == records["step"][-1]] if len(records) else records
-    for number in range(len(labels)):
-        places = last["places"][last["type"] == number]
-        ends = places[~np.isnan(places).any(axis=(1, 2))]
-        lines = np.concatenate([ends, np.full((len(ends), 1, 3), np.nan)], axis=1).reshape(-1, 3)
-        label = f"{labels[number]}, both hands bound" if len(ends) else None
-        axis.plot(lines[:, 0], lines[:, 1], color=_linker_colour(number), linewidth=1.4, zorder=3, label=label)
-    _legend_of_conformations(axis)
-
-
-def _linker_colour(number):
-    return LINKER_COLORS[number % len(LINKER_COLORS)]
-
-
-def _draw_numbers_bound(axis, labels, table):
-    name, length = _time_unit(table["time (ps)"][-1, 0])
-    time = table["time (ps)"][:, 0] / length
+def _draw_numbers_bound(axis, labels, colours, table):
+    name, time = _times(table["time (ms)"][:, 0])
     for number, label in enumerate(labels):
         for state, line in (("both hands bound", "-"), ("one hand bound", ":")):
             axis.plot(
                 time,
                 table[state][:, number],
                 line,
-                color=_linker_colour(number),
+                color=colours[number],
                 linewidth=1.5,
                 label=f"{label}, {state.removesuffix(' bound')}",
             )
@@ -203,19 +152,18 @@ def _draw_numbers_bound(axis, labels, table):
     axis.set_xlabel(f"time ({name})")
     axis.set_ylabel("linkers")
     axis.set_title("Linkers that are bound")
-    _legend_below(axis)
+    legend_below(axis)
 
 
-def _draw_tensions(axis, labels, table):
-    name, length = _time_unit(table["time (ps)"][-1, 0])
-    time = table["time (ps)"][:, 0] / length
+def _draw_tensions(axis, labels, colours, table):
+    name, time = _times(table["time (ms)"][:, 0])
     for number, label in enumerate(labels):
         for which, line, width in (("mean", "-", 1.5), ("maximum", ":", 1.0)):
             axis.plot(
                 time,
-                table[f"{which} tension (kJ/mol/nm)"][:, number] / PICONEWTON,
+                table[f"{which} tension (pN)"][:, number],
                 line,
-                color=_linker_colour(number),
+                color=colours[number],
                 linewidth=width,
                 label=f"{label}, {'largest' if which == 'maximum' else which}",
             )
@@ -224,7 +172,7 @@ def _draw_tensions(axis, labels, table):
     axis.set_xlabel(f"time ({name})")
     axis.set_ylabel("tension (pN)")
     axis.set_title("Tension of linkers with both hands bound")
-    _legend_below(axis)
+    legend_below(axis)
 
 
 def _draw_forces(axes, configuration, directory, times):
@@ -232,14 +180,14 @@ def _draw_forces(axes, configuration, directory, times):
     name, length = _time_unit(times[-1])
     if configuration.walls:
         table = read_reports(directory.wall_forces)
-        time, loads = table["time (ps)"][1:, 0] / length, table["load (kJ/mol/nm)"][1:] / PICONEWTON
+        time, loads = table["time (ms)"][1:, 0] * MILLISECOND / length, table["load (pN)"][1:]
         faces = zip(table["wall"][0].astype(int), table["face"][0].astype(int))
         for number, (wall, face) in enumerate(faces):
             label = _face_label(configuration.walls[wall], wall, face)
             axes[0].plot(time, loads[:, number], color=_COLOURS[number % len(_COLOURS)], linewidth=1.2, label=label)
     if configuration.contacts:
         table = read_reports(directory.contact_forces)
-        time, loads = table["time (ps)"][1:, 0] / length, table["load (kJ/mol/nm)"][1:] / PICONEWTON
+        time, loads = table["time (ms)"][1:, 0] * MILLISECOND / length, table["load (pN)"][1:]
         axes[1].plot(time, loads.mean(axis=1), color=_COLOURS[0], linewidth=1.5, label="mean over filaments")
         axes[1].plot(time, loads.max(axis=1), ":", color=_COLOURS[0], linewidth=1.0, label="largest")
     titles = "Forces of walls, by faces", "Forces of contacts on a filament"
@@ -252,7 +200,7 @@ def _draw_forces(axes, configuration, directory, times):
         axis.set_xlabel(f"time ({name})")
         axis.set_ylabel("sum of forces (pN)")
         axis.set_title(title)
-        _legend_below(axis)
+        legend_below(axis)
 
 
 def _face_label(wall, number, face):
@@ -266,8 +214,7 @@ def _face_label(wall, number, face):
 
 def _draw_energies(axis, groups, temperature, energies):
     kT = thermal_energy(temperature)
-    name, length = _time_unit(energies["time (ps)"][-1])
-    time = energies["time (ps)"] / length
+    name, time = _times(energies["time (ms)"])
     kinds = [group for group, *_ in groups]
     segments = np.array([group.count * group.segments for group in kinds])
     joints = np.array([group.count * group.joints for group in kinds])
@@ -288,17 +235,17 @@ def _draw_energies(axis, groups, temperature, energies):
     axis.set_xlabel(f"time ({name})")
     axis.set_ylabel("energy (kT)")
     axis.set_title("Energies, averaged over all filaments")
-    _legend(axis, loc="upper center", ncols=len(curves))
+    legend(axis, loc="upper center", ncols=len(curves))
 
 
 def _draw_tangent_correlation(axis, groups, temperature, trajectory):
     axis.set_title("Correlation of tangents along a filament")
     drawn = [entry for entry in groups if entry[0].segments > 1 and not entry[0].closed]
-    unit, scale = _length_unit(max(group.segments * group.type.segment_length for group, *_ in groups))
+    unit, scale = length_unit(max(group.segments * group.type.segment_length for group, *_ in groups))
     axis.set_xlabel(f"distance s along the filament ({unit})")
     axis.set_ylabel("⟨t(0)·t(s)⟩")
     if not drawn:
-        axis.text(0.5, 0.5, "single segments or rings", transform=axis.transAxes, ha="center", fontsize=_FONT_SIZE)
+        axis.text(0.5, 0.5, "single segments or rings", transform=axis.transAxes, ha="center", fontsize=FONT_SIZE)
         return
     exact: dict[tuple[float, bool], tuple[float, str]] = {}
     for group, members, label, colour in drawn:
@@ -333,13 +280,13 @@ def _draw_tangent_correlation(axis, groups, temperature, trajectory):
             )
     axis.set_xlim(0.0, max(group.segments * group.type.segment_length for group, *_ in drawn) / scale)
     if len(drawn) == 1:
-        _legend(axis, loc="best")
+        legend(axis, loc="best")
     else:
-        _legend_below(axis)
+        legend_below(axis)
 
 
 def _format_length(length):
-    unit, scale = _length_unit(length)
+    unit, scale = length_unit(length)
     return f"{length / scale:.4g} {unit}"
 
 
@@ -367,7 +314,7 @@ def _draw_joint_angles(axis, groups, temperature, trajectory):
     axis.set_xlabel(f"angle between {' or '.join(ends)} (degrees)")
     axis.set_ylabel("probability density (1/degree)")
     axis.set_title(f"{_kind(groups).bend_name.capitalize()} angles")
-    _legend(axis, loc="upper right")
+    legend(axis, loc="upper right")
 
 
 def _draw_exact_joint_angles(axis, group, temperature, widest, colour):
@@ -410,11 +357,11 @@ def _draw_extensions(axis, groups, temperature, trajectory):
             force = group.tension[0] / PICONEWTON
             axis.errorbar(force, value, error, fmt="o", color=colour, capsize=2.5, label=label)
     for (kind, segments), tensions in kinds.items():
-        force = np.linspace(0.0, max(tensions), 40)
+        force = max(tensions) * np.linspace(0.0, 1.0, 100) ** 2
         exact = theory.chain_extension(kind, segments, force, temperature) / (segments * kind.segment_length)
         axis.plot(force / PICONEWTON, exact, color="0.4", linestyle="--", linewidth=1.8, label=f"exact, {kind.name}")
     axis.set_xlim(left=0.0)
-    _legend(axis, loc="best")
+    legend(axis, loc="best")
 
 
 def _draw_segment_lengths(axis, groups, temperature, trajectory):
@@ -433,7 +380,7 @@ def _draw_segment_lengths(axis, groups, temperature, trajectory):
     axis.set_xlabel("segment length (nm)")
     axis.set_ylabel("probability density (1/nm)")
     axis.set_title("Segment lengths")
-    _legend(axis, loc="best")
+    legend(axis, loc="best")
 
 
 def _line(group):

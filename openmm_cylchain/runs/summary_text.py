@@ -1,14 +1,16 @@
 """The summary of a run as JSON in its directory, and as tables for a terminal."""
 
 import json
+import math
 from dataclasses import asdict
 
 import openmm
 
 from ..output.files import write_atomically
+from ..output.run_tables import MILLISECOND
 from ..units.text import format_time, format_with_error
 from ..version import __version__
-from .summary import AGREEMENT_FRACTION, AGREEMENT_SIGMA
+from .summary import AGREEMENT_FRACTION, AGREEMENT_SIGMA, NOT_COMPARABLE
 
 _EXPLANATIONS = {
     "agrees": f"agrees: within {AGREEMENT_SIGMA:g} standard errors.",
@@ -21,7 +23,7 @@ _EXPLANATIONS = {
 }
 
 
-def write_summary(configuration, directory, groups, linkers=()):
+def write_summary(configuration, directory, groups, linkers=(), measures=()):
     """Write the summary as JSON into the directory of the run."""
     settings = configuration.simulation
     content = {
@@ -31,10 +33,11 @@ def write_summary(configuration, directory, groups, linkers=()):
         "platform": settings.platform,
         "scheme": settings.scheme,
         "temperature (K)": configuration.solvent.temperature,
-        "time step (ps)": settings.time_step,
-        "simulated time (ps)": settings.steps * settings.time_step,
+        "time step (ms)": settings.time_step / MILLISECOND,
+        "simulated time (ms)": settings.steps * settings.time_step / MILLISECOND,
         "groups": [asdict(group) for group in groups],
         **({"linkers": [asdict(own) for own in linkers]} if linkers else {}),
+        **({"measures": [asdict(own) for own in measures]} if measures else {}),
     }
     write_atomically(directory.summary, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
 
@@ -45,24 +48,71 @@ def _rounded(value, digits):
     return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e9 else text
 
 
-def format_summary(configuration, groups, linkers=()):
-    """The summary as text for a terminal."""
+def format_summary(configuration, groups, linkers=(), measures=()):
+    """The summary as text for a terminal: what is compared with theory, averages of what is not, and measures."""
     settings = configuration.simulation
     lines = [
         f"{configuration.title or 'Run'}: {format_time(settings.steps * settings.time_step)} in steps of "
         f"{format_time(settings.time_step)}, scheme {settings.scheme}"
     ]
-    for group in groups:
-        lines += ["", group.label, *_table(group.observables), *(f"  {note}" for note in group.notes)]
+    if measures:
+        lines += ["", *_table_of_measures(measures)]
     if linkers:
         lines += [
             "",
             *_linker_table(linkers),
             "  Means over the last half of the run; the largest tension of all of it.",
         ]
+    compared = [[own for own in group.observables if own.verdict != NOT_COMPARABLE] for group in groups]
+    for group, own in zip(groups, compared):
+        if len(own) > 1:
+            lines += ["", group.label, *_table([(_name(one), one) for one in own])]
+    single = [(f"{group.label}: {_name(own[0])}", own[0]) for group, own in zip(groups, compared) if len(own) == 1]
+    if single:
+        lines += ["", *_table(single)]
+    others = [group for group, own in zip(groups, compared) if len(own) < 2]
+    if others:
+        lines += ["", *_table_of_averages(others)]
+    lines += ["", *_notes(groups)]
     verdicts = {observable.verdict for group in groups for observable in group.observables}
     lines += ["", *(text for verdict, text in _EXPLANATIONS.items() if verdict in verdicts)]
     return "\n".join(lines).rstrip()
+
+
+def _notes(groups):
+    # What holds for all filaments is said once.
+    owners = {}
+    for group in groups:
+        for note in group.notes:
+            owners.setdefault(note, []).append(group.label)
+    for note, labels in owners.items():
+        yield f"  {note}" if len(labels) == len(groups) else f"  {'; '.join(labels)}: {note}"
+
+
+def _table_of_measures(measures):
+    rows = [("", "first frame", "last frame", "second half of the run")]
+    for own in measures:
+        ends = ["" if value is None else _rounded(value, 3) for value in (own.first, own.last)]
+        mean = "" if own.mean is None else format_with_error(own.mean, own.standard_error)
+        rows.append((own.name + (f" ({own.unit})" if own.unit else ""), *ends, mean))
+    return _aligned(rows, (0,))
+
+
+def _table_of_averages(groups):
+    """Of what is not compared, the bends and the distance of the ends."""
+    rows = [("", "energy per bend (kT)", "of free ones", "end-to-end distance, root of mean square (nm)")]
+    for group in groups:
+        found = {own.name: own for own in group.observables}
+        bend = next((own for name, own in found.items() if name.startswith("bending energy")), None)
+        square = found.get("mean square end-to-end distance")
+        cells = ["-"] * 3
+        if bend is not None:
+            cells[:2] = format_with_error(bend.value, bend.standard_error), _rounded(bend.theory, 3)
+        if square is not None and square.value > 0.0:
+            root = math.sqrt(square.value)
+            cells[2] = format_with_error(root, 0.5 * square.standard_error / root)
+        rows.append((group.label, *cells))
+    return _aligned(rows, (0,))
 
 
 def _linker_table(linkers):
@@ -77,16 +127,18 @@ def _linker_table(linkers):
     return _aligned(rows, (0,))
 
 
+def _name(observable):
+    return observable.name + (f" ({observable.unit})" if observable.unit else "")
+
+
 def _table(observables):
     rows = [("", "average", "standard error", "theory", "deviation", "", "")]
-    for observable in observables:
+    for name, observable in observables:
         deviation = "-" if observable.deviation is None else f"{observable.deviation:+.1f} sigma"
         relative = observable.relative_deviation
-        if observable.verdict == "not comparable":
-            deviation, relative = "-", None
         rows.append(
             (
-                observable.name + (f" ({observable.unit})" if observable.unit else ""),
+                name,
                 _rounded(observable.value, 6),
                 _rounded(observable.standard_error, 2),
                 _rounded(observable.theory, 6),

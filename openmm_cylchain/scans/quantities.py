@@ -4,6 +4,7 @@ import json
 from dataclasses import dataclass
 
 from ..errors import InputError
+from ..runs.measures import MEASURES
 
 _OF_FILAMENTS = (
     "stretching energy per segment",
@@ -21,7 +22,7 @@ _OF_LINKERS = {
     "mean tension of linkers": ("mean_tension", "pN"),
     "largest tension of linkers": ("largest_tension", "pN"),
 }
-QUANTITIES = (*_OF_FILAMENTS, *_OF_LINKERS)
+QUANTITIES = (*_OF_FILAMENTS, *_OF_LINKERS, *MEASURES)
 """Names of all quantities."""
 
 
@@ -43,7 +44,11 @@ def read_quantities(path):
     """The quantities of the summary of a run: a list of Quantity."""
     try:
         summary = json.loads(path.read_text())
-        return [*_of_filaments(summary["groups"]), *_of_linkers(summary.get("linkers", []))]
+        return [
+            *_of_filaments(summary["groups"]),
+            *_of_linkers(summary.get("linkers", [])),
+            *_of_all(summary.get("measures", [])),
+        ]
     except (ValueError, KeyError, TypeError):
         raise InputError(f"{path} is no summary of a run: remove it, and start the scan again.") from None
 
@@ -70,6 +75,13 @@ def _of_linkers(linkers):
         for quantity, (field, unit) in _OF_LINKERS.items():
             if own[field] is not None:
                 yield Quantity(name, number, quantity, unit, own[field], own.get(f"{field}_error"), None)
+
+
+def _of_all(measures):
+    # The mean over the second half of the run, or what is in the last frame.
+    for own in measures:
+        value = own["last"] if own["mean"] is None else own["mean"]
+        yield Quantity("all filaments", 0, own["name"], own["unit"], value, own["standard_error"], None)
 
 
 def _distinct(names):

@@ -1,5 +1,8 @@
 """Filaments as they are added: before they are in a System."""
 
+from __future__ import annotations
+
+from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +19,8 @@ from ..units.types import IntArray, Scalar, Vector, Vectors
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
+
+_MOST_KINDS = 4
 
 
 class AddedFilaments:
@@ -38,6 +43,12 @@ class AddedFilaments:
 
     def __len__(self) -> int:
         return len(self._filaments)
+
+    def __repr__(self) -> str:
+        kinds = Counter((own.type.name, own.type.segment_kind.name, own.segments) for own in self._filaments)
+        parts = [f"{count} × {name}, {size} {kind}{'s' * (size > 1)}" for (name, kind, size), count in kinds.items()]
+        shown = "; ".join(parts[:_MOST_KINDS]) + "; ..." * (len(parts) > _MOST_KINDS)
+        return f"<Filaments at {self._temperature:g} K, {self._engine_name} engine: {shown or 'none yet'}>"
 
     def __getitem__(self, index: int) -> Filament:
         return self._filaments[index]
@@ -74,7 +85,7 @@ class AddedFilaments:
         segments: int,
         start: Vector,
         direction: Vector,
-        **options: "Unpack[FilamentOptions]",
+        **options: Unpack[FilamentOptions],
     ) -> int:
         """Add a straight filament with segments of rest length.
 
@@ -112,7 +123,7 @@ class AddedFilaments:
         closed: bool = False,
         tangents: Vectors | None = None,
         control_points: Vectors | None = None,
-        **options: "Unpack[FilamentOptions]",
+        **options: Unpack[FilamentOptions],
     ) -> int:
         """Add a filament with given node positions.
 
@@ -148,7 +159,7 @@ class AddedFilaments:
         segments: int,
         center: Vector,
         normal: Vector = (0.0, 0.0, 1.0),
-        **options: "Unpack[FilamentOptions]",
+        **options: Unpack[FilamentOptions],
     ) -> int:
         """Add a ring: a regular polygon with segments of rest length, or a circle of beam elements without strains.
 
@@ -180,7 +191,7 @@ class AddedFilaments:
         seed: int,
         start: Vector = (0.0, 0.0, 0.0),
         direction: Vector | None = None,
-        **options: "Unpack[FilamentOptions]",
+        **options: Unpack[FilamentOptions],
     ) -> int:
         """Add a filament drawn from the exact equilibrium of the free discrete chain.
 

@@ -81,7 +81,8 @@ def describe_system(
         ),
         box=None if box is None else tuple(tuple(float(edge) for edge in vector) for vector in box),
         linkers=tuple(
-            DescribedLinkers(own.kind.name, own.kind.stiffness, own.kind.rest_length) for own in filaments.linkers
+            DescribedLinkers(own.kind.name, own.kind.stiffness, own.kind.rest_length, own.kind.is_motor)
+            for own in filaments.linkers
         ),
         walls=(*walls, *(DescribedWall(*_region(shape.region)) for shape in shapes)),
         contacts=tuple(contacts),

@@ -1,5 +1,7 @@
 """Filaments, which users add, put into a System, integrate and ask; the work is done by the modules that it calls."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -70,7 +72,7 @@ class Filaments(TiedFilaments):
 
     def build(
         self, box_vectors: BoxVectors | None = None, stretching_force_group: int = 0, bending_force_group: int = 0
-    ) -> tuple["app.Topology", openmm.System, unit.Quantity]:
+    ) -> tuple[app.Topology, openmm.System, unit.Quantity]:
         """Put the filaments into a new Topology, System and positions.
 
         Parameters
@@ -107,7 +109,7 @@ class Filaments(TiedFilaments):
 
     def add_to(
         self,
-        topology: "app.Topology",
+        topology: app.Topology,
         system: openmm.System,
         positions: Vectors,
         stretching_force_group: int = 0,

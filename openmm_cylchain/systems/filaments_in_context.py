@@ -1,5 +1,7 @@
 """What can differ between Contexts: what is asked of filaments, or changed, in one of them."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

@@ -10,6 +10,8 @@ least of the diagonal elements of its vectors. So there is one image at most tha
 half that width, and that is the one to take.
 """
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -82,7 +84,7 @@ def make_whole(positions: Vectors, filaments: Filaments, box_vectors: BoxVectors
     return frames.reshape(given.shape) * unit.nanometer
 
 
-def make_trajectory_whole(trajectory: "mdtraj.Trajectory") -> "mdtraj.Trajectory":
+def make_trajectory_whole(trajectory: mdtraj.Trajectory) -> mdtraj.Trajectory:
     """A copy of an mdtraj trajectory in which filaments are whole in every frame; see ``make_whole``.
 
     Filaments are found by the names of their nodes, see ``analysis``. An attachment point goes to the segment of its
@@ -112,7 +114,7 @@ def make_trajectory_whole(trajectory: "mdtraj.Trajectory") -> "mdtraj.Trajectory
     return _with_positions(trajectory, positions)
 
 
-def remove_jumps(trajectory: "mdtraj.Trajectory") -> "mdtraj.Trajectory":
+def remove_jumps(trajectory: mdtraj.Trajectory) -> mdtraj.Trajectory:
     """A copy of an mdtraj trajectory in which filaments are whole and go on from frame to frame without jumps.
 
     A filament's middle is taken to the image that is nearest to where it was in the frame before, so that it may leave

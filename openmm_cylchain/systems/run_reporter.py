@@ -19,8 +19,6 @@ from ..output.linker_records import LinkerFile, measure_linkers
 from ..output.record_file import read_records
 from ..output.run_files import RunFiles
 from ..output.run_tables import (
-    ENERGY_COLUMNS,
-    LINKER_TABLE_COLUMNS,
     ReportTable,
     TrajectoryFile,
     size_of_lines,
@@ -155,8 +153,8 @@ class RunReporter:
             description.write(files.description)
             write_topology(files, simulation.topology, filaments, system, state.getPositions(asNumpy=True))
 
-        def table(path, columns):
-            return ReportTable(path, columns, size_of_lines(path, step)[0] if self._append else None)
+        def table(path):
+            return ReportTable(path, size_of_lines(path, step)[0] if self._append else None)
 
         with contextlib.ExitStack() as stack:
 
@@ -169,9 +167,9 @@ class RunReporter:
             self._trajectory = opened(
                 TrajectoryFile(files.trajectory, simulation.topology, time_step, self._interval, *begun)
             )
-            self._energies = opened(table(files.energies, ENERGY_COLUMNS))
+            self._energies = opened(table(files.energies))
             if filaments.linkers:
-                self._linkers = opened(table(files.linkers, LINKER_TABLE_COLUMNS))
+                self._linkers = opened(table(files.linkers))
                 count = None
                 if self._append:
                     count = int(np.searchsorted(read_records(files.linker_places)["step"], step, "right"))

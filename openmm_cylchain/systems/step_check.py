@@ -29,6 +29,8 @@ as those of scheme "euler" on chains. For the latter, free filaments that begin 
 averages, too.
 """
 
+from __future__ import annotations
+
 import math
 import time
 import warnings

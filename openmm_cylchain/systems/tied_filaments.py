@@ -1,5 +1,7 @@
 """What is tied to filaments before they are in a System: tethers, attachment points, beads and linkers."""
 
+from __future__ import annotations
+
 from collections import defaultdict
 from typing import Any
 from weakref import WeakKeyDictionary

@@ -3,6 +3,8 @@
 They are exact but for products of strains and bends.
 """
 
+from __future__ import annotations
+
 import numpy as np
 import numpy.typing as npt
 

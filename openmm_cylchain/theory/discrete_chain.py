@@ -1,5 +1,7 @@
 """Statistics of the free discrete chain, exact for the model that is simulated, at any stiffness."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -1,5 +1,7 @@
 """Force and extension: of the wormlike chain, of the discrete chain, and spring constants of chains under tension."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

@@ -1,5 +1,7 @@
 """Diffusion of a free segment: its orientation, and the displacement of its centre."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from ..mechanics.friction import SegmentFriction, rotational_relaxation_time

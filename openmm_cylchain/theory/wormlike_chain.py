@@ -1,5 +1,7 @@
 """The continuous wormlike chain (WLC): end-to-end distance, tangents, bending modes, and one that is clamped."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

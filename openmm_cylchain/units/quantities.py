@@ -1,5 +1,7 @@
 """Conversion of user input, with or without units, to plain numbers in OpenMM's units."""
 
+from __future__ import annotations
+
 import math
 import reprlib
 from typing import Any

@@ -70,7 +70,7 @@ def test_frames_and_their_times(two_types):
     np.testing.assert_array_equal(run.steps, 10 * np.arange(FRAMES))
     assert run.box is None and run.walls == () and run.linker_table == {}
     assert [len(records) for records in run.linkers] == [0] * FRAMES
-    assert run.energies["potential energy (kJ/mol)"].shape == (FRAMES,)
+    assert run.energies["potential energy (pN nm)"].shape == (FRAMES,)
 
 
 def test_positions_are_those_of_the_trajectory(two_types):

@@ -23,7 +23,10 @@ LANGUAGES = {"python", "toml", "sh", "bash", "text", "mermaid", "{toctree}", "{c
 # That of the README is in tests/test_readme.py.
 PYTHON_PAGES = [page for page in PAGES if blocks_of(page, "python") and page.name != "README.md"]
 # Pages whose blocks take more than a few seconds.
-SLOW = {f"docs/tutorials/{name}.md" for name in ("contractile_bundle", "dna_persistence_length", "force_extension")}
+SLOW = {
+    f"docs/tutorials/{name}.md"
+    for name in ("buckling", "contractile_bundle", "dna_persistence_length", "force_extension")
+}
 
 FILAMENTS_IN_A_SYSTEM = """
 import openmm

@@ -79,3 +79,12 @@ def test_every_example_is_in_the_gallery_with_its_picture():
 
 def test_scans_are_in_the_reference():
     assert sorted(entries("scans")) == sorted(scans.__all__)
+
+
+@pytest.mark.parametrize("module", [openmm_cylchain, analysis, theory, scans, statistics], ids=lambda own: own.__name__)
+def test_signatures_are_short(module):
+    """``help`` shows names of types, rather than what they stand for."""
+    for name, thing in vars(module).items():
+        for own in (thing, *(vars(thing).values() if inspect.isclass(thing) else ())):
+            if inspect.isfunction(own):
+                assert "numpy._typing" not in str(inspect.signature(own)), (name, own)

@@ -6,6 +6,7 @@ import sys
 import imageio_ffmpeg
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from PIL import Image
 
 from openmm_cylchain import InputError, Plane, Slab, Sphere, analysis
@@ -13,14 +14,14 @@ from openmm_cylchain.cli import main
 from openmm_cylchain.couplings.shapes import Box, Cylinder, Ellipsoid
 from openmm_cylchain.rendering.annotations import Margins, clock_text, margins, scale_bar_length
 from openmm_cylchain.rendering.camera import camera_on
-from openmm_cylchain.rendering.colors import filament_colors, linker_color
+from openmm_cylchain.rendering.colors import PLUS_END_COLOR, filament_colors, linker_colors
 from openmm_cylchain.rendering.pictures import View, images, write_film
-from openmm_cylchain.rendering.scene import COLORINGS, Look, make_scene
+from openmm_cylchain.rendering.scene import COLORINGS, Look, has_polarity, make_scene
 from support.small_runs import AMONG_SPHERES, NETWORK, TWO_TYPES, simulated
 
 SIZE = ["--size", "160x120"]
 SMALL = View(size=(160, 120))
-BLUE, GREEN, ORANGE = (0, 114, 178), (0, 158, 115), (230, 159, 0)
+BLUE, GREEN, RED, YELLOW = (0, 114, 178), (0, 158, 115), (179, 38, 30), (242, 178, 0)
 
 
 @pytest.fixture(scope="module")
@@ -51,9 +52,9 @@ def test_a_picture_of_a_network(network, tmp_path):
     image = picture(network, tmp_path, "--size", "320x240")
     assert image.shape == (240, 320, 3)
     assert tuple(np.median(image.reshape(-1, 3), axis=0)) == (255, 255, 255)
-    assert hue_of(image, BLUE) > 1000 and hue_of(image, ORANGE) > 100
+    assert hue_of(image, BLUE) > 1000 and hue_of(image, YELLOW) > 50 and hue_of(image, RED) > 100
     bare = picture(network, tmp_path, "--size", "320x240", "--no-linkers")
-    assert hue_of(bare, ORANGE) < 20 < hue_of(bare, BLUE)
+    assert max(hue_of(bare, YELLOW), hue_of(bare, RED)) < 20 < hue_of(bare, BLUE)
 
 
 def test_types_have_colors(two_types, tmp_path):
@@ -196,6 +197,22 @@ def test_particles_are_balls_of_their_diameter(tmp_path):
     assert legends[0][0] == legends[1][0] and len(legends[1]) == 1
     pictures = [picture(run.path, tmp_path, *SIZE, *options) for options in ([], ["--no-particles"])]
     assert np.mean(np.any(pictures[0] != pictures[1], axis=2)) > 0.02
+    alone = Look(hidden=("BIG",))
+    assert [own.name for own in alone.particles_of(run)] == ["SMALL"]
+    assert [name for name, _, kind in make_scene(run, alone, [0]).legend if kind == "particle"] == ["SMALL"]
+    hidden = picture(run.path, tmp_path, *SIZE, "--hide", "BIG,SMALL")
+    np.testing.assert_array_equal(hidden, pictures[1])
+
+
+def test_water_is_left_out_and_plus_ends_are_marked(network):
+    """Of this run: particles that it does not have, and motors that walk."""
+    run = analysis.load(network)
+    assert "HOH" in Look().hidden and has_polarity(run)
+    scene = make_scene(run, Look(whole=True, linkers=False), [6])
+    assert ("last node (plus end)", PLUS_END_COLOR, "particle") in scene.legend
+    black = np.all(np.abs(scene.tubes(6).colors - np.array(to_rgb(PLUS_END_COLOR))) < 1e-9, axis=1)
+    drawn = {tuple(np.round(place, 3)) for place in scene.tubes(6).ends[black][:, 0]}
+    assert drawn == {tuple(np.round(own[-1].astype(float), 3)) for own in run.nodes(6)}
 
 
 def test_linkers_are_drawn_where_they_are(network):
@@ -260,7 +277,8 @@ def test_a_gif_keeps_the_colors_of_its_legend(network, tmp_path):
     options = ["--film", "--frames", ":2", "--size", "640x480"]
     assert main(["render", str(network), "--output", str(path), *options]) == 0
     there = {tuple(color) for color in np.asarray(Image.open(path).convert("RGB")).reshape(-1, 3)}
-    for color in (*filament_colors(analysis.load(network)).values(), linker_color(0), linker_color(1)):
+    run = analysis.load(network)
+    for color in (*filament_colors(run).values(), *linker_colors(run)):
         assert tuple(bytes.fromhex(color[1:])) in there, color
 
 

@@ -28,6 +28,7 @@ from openmm_cylchain.runs.configuration import parse_configuration, read_configu
 from openmm_cylchain.runs.initial_state import build_system
 from openmm_cylchain.runs.run_directory import RunDirectory
 from openmm_cylchain.runs.summary import group_labels, load_trajectory, summarise
+from openmm_cylchain.units.quantities import PICONEWTON
 from support.configurations import BEAMS
 from support.contexts import positions_of
 from support.small_runs import simulated
@@ -206,7 +207,7 @@ def test_runs_of_rings(tmp_path):
     for own, nodes, controls in chains_of(filaments, run.positions(-1)):
         parts = own.energies(nodes) if own.type.segment_kind.straight else own.energies(nodes, controls, 310.0)
         bending += parts[1]
-    assert energies["bending energy (kJ/mol)"][-1] == pytest.approx(bending, rel=1e-3)
+    assert PICONEWTON * energies["bending energy (pN nm)"][-1] == pytest.approx(bending, rel=1e-3)
     assert main(["render", str(out), "--output", str(tmp_path / "rings.png")]) == 0
     # Rings of a trajectory are known by their bonds.
     files = f'file = "{out}/trajectory.dcd"\ntopology = "{out}/topology.cif"\nfilaments = [6, 7]\n'
@@ -279,8 +280,8 @@ def test_energies_are_those_of_the_curve(unbroken):
             else:
                 parts = element_energies(nodes, controls, own.beam_element(310.0))
             stretching, bending = stretching + np.sum(parts[0]), bending + np.sum(parts[1])
-        assert energies["bending energy (kJ/mol)"][frame] == pytest.approx(bending, rel=1e-3)
-        assert energies["stretching energy (kJ/mol)"][frame] == pytest.approx(stretching, rel=1e-2)
+        assert PICONEWTON * energies["bending energy (pN nm)"][frame] == pytest.approx(bending, rel=1e-3)
+        assert PICONEWTON * energies["stretching energy (pN nm)"][frame] == pytest.approx(stretching, rel=1e-2)
         # Of the straight filament, a joint and two segments.
         joints = ELEMENTS + STRAIGHT - 1
         assert energies["bending energy per joint (kT)"][frame] == pytest.approx(bending / joints / kT, rel=1e-3)
@@ -479,7 +480,8 @@ def test_a_run_reporter_writes_what_is_loaded_and_drawn_alike(tmp_path):
     simulation.step(10)
     run = analysis.load(tmp_path / "run")
     assert len(run) == 3 and [own.pieces for own in run.filaments] == [8, 1]
-    assert run.energies["bending energy (kJ/mol)"][1:] == pytest.approx(energies["bending_energy"].sum(axis=1))
+    bending = energies["bending_energy"].sum(axis=1)
+    assert PICONEWTON * run.energies["bending energy (pN nm)"][1:] == pytest.approx(bending)
     now = positions_of(simulation.context)
     expected = curve_points(now[filaments.node_indices[0]], now[filaments.control_point_indices[0]], 8)
     np.testing.assert_allclose(run.curves(-1)[0], expected, atol=1e-3)

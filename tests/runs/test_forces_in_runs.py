@@ -55,15 +55,15 @@ def unbroken(tmp_path_factory):
 def test_tables_have_means_between_reports(unbroken):
     found = analysis.load(unbroken)
     walls, contacts = found.wall_forces, found.contact_forces
-    assert walls["load (kJ/mol/nm)"].shape == (11, 2) and contacts["load (kJ/mol/nm)"].shape == (11, 12)
+    assert walls["load (pN)"].shape == (11, 2) and contacts["load (pN)"].shape == (11, 12)
     for table in (walls, contacts):
-        np.testing.assert_allclose(table["mean over (ps)"][:, 0], [0.0, *[2e7] * 10])
-        np.testing.assert_array_equal(table["time (ps)"][:, 0], found.times)
-    assert walls["face"][0].tolist() == [0, 1] and walls["load (kJ/mol/nm)"][1:].min() > 0.0
-    np.testing.assert_allclose(walls["force z (kJ/mol/nm)"][1:] * [-1, 1], walls["load (kJ/mol/nm)"][1:])
-    assert contacts["load (kJ/mol/nm)"].max() > 0.0
+        np.testing.assert_allclose(table["mean over (ms)"][:, 0], [0.0, *[0.02] * 10])
+        np.testing.assert_allclose(table["time (ms)"][:, 0], 1e-9 * found.times, rtol=1e-14)
+    assert walls["face"][0].tolist() == [0, 1] and walls["load (pN)"][1:].min() > 0.0
+    np.testing.assert_allclose(walls["force z (pN)"][1:] * [-1, 1], walls["load (pN)"][1:])
+    assert contacts["load (pN)"].max() > 0.0
     # They push each other.
-    sums = [contacts[f"force {axis} (kJ/mol/nm)"].sum(axis=1) for axis in "xyz"]
+    sums = [contacts[f"force {axis} (pN)"].sum(axis=1) for axis in "xyz"]
     np.testing.assert_allclose(sums, 0.0, atol=1e-9)
 
 
@@ -98,7 +98,7 @@ def test_a_run_reporter_writes_the_same_tables(unbroken, tmp_path):
         assert list(one) == list(other)
         np.testing.assert_array_equal(one["step"], other["step"][:6])
         # Positions of a trajectory are in single precision.
-        np.testing.assert_allclose(one["load (kJ/mol/nm)"], other["load (kJ/mol/nm)"][:6], atol=1e-2)
+        np.testing.assert_allclose(one["load (pN)"], other["load (pN)"][:6], atol=1e-2)
 
 
 def test_runs_without_walls_and_contacts_have_no_such_tables(tmp_path):
@@ -118,6 +118,6 @@ def test_the_figure_has_panels_of_forces(unbroken, monkeypatch):
     walls, contacts = drawn[0].axes[-2:]
     assert walls.get_title() == "Forces of walls, by faces"
     assert [line.get_label() for line in walls.lines] == ["wall 0, slit, upper face", "wall 0, slit, lower face"]
-    table = analysis.load(unbroken).contact_forces["load (kJ/mol/nm)"][1:] / 0.602214076
+    table = analysis.load(unbroken).contact_forces["load (pN)"][1:]
     np.testing.assert_allclose(contacts.lines[0].get_ydata(), table.mean(axis=1))
     np.testing.assert_allclose(contacts.lines[1].get_ydata(), table.max(axis=1))

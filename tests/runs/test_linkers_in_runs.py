@@ -234,7 +234,7 @@ def test_tables_and_places_are_those_of_the_linkers(unbroken):
     table = read_reports(unbroken / "linkers.csv")
     assert table["step"].shape == (FRAMES, 2)
     np.testing.assert_array_equal(table["step"][:, 0], np.arange(0, 801, 20))
-    np.testing.assert_allclose(table["time (ps)"][:, 1], 5e6 * table["step"][:, 1])
+    np.testing.assert_allclose(table["time (ms)"][:, 1], 5e-3 * table["step"][:, 1])
     states = np.stack([table[name] for name in ("unbound", "one hand bound", "both hands bound")], axis=2)
     np.testing.assert_array_equal(states.sum(axis=2), np.broadcast_to((60, 40), (FRAMES, 2)))
     np.testing.assert_array_equal(states[0], [[30, 30, 0], [0, 40, 0]])
@@ -257,7 +257,7 @@ def test_tables_and_places_are_those_of_the_linkers(unbroken):
             lengths = np.linalg.norm(here["places"][both, 1] - here["places"][both, 0], axis=1)
             tensions = group.kind.stiffness * (lengths - group.kind.rest_length)
             np.testing.assert_allclose(here["tension"][both], tensions, atol=2e-3)
-            mean, largest = (table[f"{name} tension (kJ/mol/nm)"][report, number] for name in ("mean", "maximum"))
+            mean, largest = (PN * table[f"{name} tension (pN)"][report, number] for name in ("mean", "maximum"))
             if both.any():
                 np.testing.assert_allclose((mean, largest), (tensions.mean(), tensions.max()), atol=2e-3)
             else:
@@ -308,13 +308,13 @@ def test_summary_has_linkers(unbroken, capsys):
         assert own["name"] == name
         late = table["both hands bound"][FRAMES // 2 :, number]
         assert own["both_hands_bound"] == pytest.approx(late.mean())
-        tension = table["mean tension (kJ/mol/nm)"][FRAMES // 2 :, number]
-        largest = table["maximum tension (kJ/mol/nm)"][:, number]
+        tension = table["mean tension (pN)"][FRAMES // 2 :, number]
+        largest = table["maximum tension (pN)"][:, number]
         if np.isnan(largest).all():
             assert own["mean_tension"] is None and own["largest_tension"] is None
             continue
-        assert own["mean_tension"] == pytest.approx(np.average(tension[late > 0], weights=late[late > 0]) / PN)
-        assert own["largest_tension"] == pytest.approx(np.nanmax(largest) / PN)
+        assert own["mean_tension"] == pytest.approx(np.average(tension[late > 0], weights=late[late > 0]))
+        assert own["largest_tension"] == pytest.approx(np.nanmax(largest))
     assert summary["linkers"][1]["largest_tension"] > 0
     assert main(["run", str(unbroken / "configuration.toml"), "--output", str(unbroken), "--resume"]) == 0
     text = capsys.readouterr().out

@@ -52,7 +52,7 @@ def pulled(tmp_path_factory):
 def test_points_forces_and_extensions(pulled):
     run = analysis.load(pulled)
     table = run.pulling
-    assert table["force along the velocity (kJ/mol/nm)"].shape == (21, 2)
+    assert table["force along the velocity (pN)"].shape == (21, 2)
     np.testing.assert_array_equal(table["tether"], np.tile([0, 1], (21, 1)))
     np.testing.assert_array_equal(table["filament"], np.tile([0, 1], (21, 1)))
     # 1 um/s is 1e-9 nm/ps; an interval of the points' motion before the report.
@@ -70,8 +70,8 @@ def test_points_forces_and_extensions(pulled):
         np.testing.assert_allclose(points, expected, atol=1e-9)
         nodes = np.array([run.nodes(frame)[number] for frame in range(21)])
         along = np.array([0.8, 0.6, 0.0])
-        forces = 0.05 * 0.602214076 * (points - nodes[:, -1]) @ along
-        np.testing.assert_allclose(table["force along the velocity (kJ/mol/nm)"][:, number], forces, atol=1e-5)
+        forces = 0.05 * (points - nodes[:, -1]) @ along
+        np.testing.assert_allclose(table["force along the velocity (pN)"][:, number], forces, atol=1e-5)
         extensions = (nodes[:, -1] - nodes[:, 0]) @ along
         np.testing.assert_allclose(table["extension along the velocity (nm)"][:, number], extensions, atol=1e-3)
 

@@ -14,15 +14,17 @@ import numpy as np
 import pytest
 from openmm import app
 
-from openmm_cylchain import F_ACTIN, InputError
+from openmm_cylchain import F_ACTIN, InputError, analysis
 from openmm_cylchain.cli import main
 from openmm_cylchain.engines.gpu_platforms import why_not_on
 from openmm_cylchain.output.read_tables import read_table
+from openmm_cylchain.output.run_tables import ReportTable, size_of_lines
 from openmm_cylchain.runs.configuration import parse_configuration, read_configuration
 from openmm_cylchain.runs.run import run
 from openmm_cylchain.runs.run_directory import RunDirectory
 from openmm_cylchain.runs.summary import load_trajectory, summarise
 from openmm_cylchain.runs.summary_text import format_summary
+from openmm_cylchain.units.quantities import PICONEWTON
 from support.checkpoints import resealed
 from support.commands import COMMAND, finish, start, wait_for_size
 from support.configurations import placed_filaments
@@ -114,11 +116,11 @@ def test_energies_are_those_of_the_trajectory(unbroken):
     with open(unbroken / "energies.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [int(row["step"]) for row in rows] == list(range(0, 1201, 20))
-    assert [float(row["time (ps)"]) for row in rows] == [1e4 * step for step in range(0, 1201, 20)]
+    assert [row["time (ms)"] for row in rows] == [repr(step / 1e5) for step in range(0, 1201, 20)]
     energies = read_table(unbroken / "energies.csv")
     configuration = read_configuration(unbroken / "configuration.toml")
     trajectory = load_trajectory(configuration, RunDirectory(unbroken))
-    np.testing.assert_allclose(trajectory.time, energies["time (ps)"])
+    np.testing.assert_allclose(trajectory.time, 1e9 * energies["time (ms)"])
     kT = 8.31446261815324e-3 * 310
     stretching, bending, distances = 0.0, 0.0, []
     for chain in trajectory.topology.chains:
@@ -130,9 +132,9 @@ def test_energies_are_those_of_the_trajectory(unbroken):
         bending += F_ACTIN.bending_energy((tangents[:, 1:] * tangents[:, :-1]).sum(axis=2)).sum(axis=1)
         distances.append(np.linalg.norm(nodes[:, -1] - nodes[:, 0], axis=1))
     tolerance = dict(rtol=1e-2, atol=0.05)
-    np.testing.assert_allclose(energies["stretching energy (kJ/mol)"], stretching, **tolerance)
-    np.testing.assert_allclose(energies["bending energy (kJ/mol)"], bending, **tolerance)
-    np.testing.assert_allclose(energies["potential energy (kJ/mol)"], stretching + bending, **tolerance)
+    np.testing.assert_allclose(PICONEWTON * energies["stretching energy (pN nm)"], stretching, **tolerance)
+    np.testing.assert_allclose(PICONEWTON * energies["bending energy (pN nm)"], bending, **tolerance)
+    np.testing.assert_allclose(PICONEWTON * energies["potential energy (pN nm)"], stretching + bending, **tolerance)
     np.testing.assert_allclose(energies["stretching energy per segment (kT)"], stretching / 22 / kT, **tolerance)
     np.testing.assert_allclose(energies["bending energy per joint (kT)"], bending / 18 / kT, **tolerance)
     np.testing.assert_allclose(energies["mean end-to-end distance (nm)"], np.mean(distances, axis=0), rtol=1e-6)
@@ -140,7 +142,7 @@ def test_energies_are_those_of_the_trajectory(unbroken):
 
 def test_summary_has_both_groups(unbroken):
     summary = json.loads((unbroken / "summary.json").read_text())
-    assert summary["simulated time (ps)"] == 12e6
+    assert summary["simulated time (ms)"] == 0.012
     free, straight = summary["groups"]
     assert (free["filaments"], free["segments"], free["in_equilibrium"]) == (3, 6, True)
     assert (straight["filaments"], straight["segments"], straight["in_equilibrium"]) == (1, 4, False)
@@ -334,6 +336,22 @@ def test_resume_with_another_configuration_is_refused(tmp_path, unbroken, capsys
     )
     # A comment changes nothing.
     assert main(["run", configured(tmp_path, SHORT + "# comment\n"), "--output", output, "--resume"]) == 0
+
+
+def test_tables_in_other_units_are_refused(tmp_path, unbroken, capsys):
+    out = tmp_path / "out"
+    shutil.copytree(unbroken, out)
+    table = out / "energies.csv"
+    size = table.stat().st_size
+    table.write_text(table.read_text().replace("time (ms)", "time (ps)"))
+    with pytest.raises(InputError, match=r"energies.csv was written by another version.*'step,time \(ps\),stretching"):
+        analysis.load(out)
+    with pytest.raises(InputError, match="another version"):
+        ReportTable(table, size)
+    with pytest.raises(InputError, match="another version"):
+        size_of_lines(table, 20)
+    assert main(["run", str(out / "configuration.toml"), "--output", str(out), "--resume"]) == 2
+    assert "but now 'step,time (ms),stretching energy (pN nm)" in capsys.readouterr().err
 
 
 def test_directory_of_a_run_is_refused_without_resume(tmp_path, unbroken, capsys):
@@ -547,7 +565,7 @@ def test_configuration_without_an_energy_is_traced_to_its_segment(tmp_path, monk
     assert main(["run", configured(tmp_path, text), "--output", str(tmp_path / "out")]) == 1
     error = capsys.readouterr().err
     assert "Filament 3 (ACT) has blown up at segment 3 by step" in error and "its position or energy is not" in error
-    assert np.all(np.isfinite(read_table(tmp_path / "out" / "energies.csv")["stretching energy (kJ/mol)"]))
+    assert np.all(np.isfinite(read_table(tmp_path / "out" / "energies.csv")["stretching energy (pN nm)"]))
 
 
 @pytest.mark.parametrize(

@@ -228,6 +228,53 @@ def test_places_in_a_region():
         built(filament=FILAMENT + 'inside = { shape = "sphere", radius = "200 nm" }\n')
 
 
+def test_concentrations_of_monomers():
+    """Of a volume of 8 um^3, 602.214 monomers in each uM and um^3, and mean lengths of 500 nm."""
+    own = FILAMENT.replace("6", "[4, 6]")
+    (four, six) = parse(BOX, filament=own + 'monomer_concentration = "2 uM"\n').filaments
+    assert (four.count, six.count) == (27, 26) and round(2 * 602.214 * 8 * 2.73 / 500) == 53
+    length = 'monomer_concentration = "2 uM"\nmonomer_length = "5.46 nm"\n'
+    assert sum(group.count for group in parse(BOX, filament=own + length).filaments) == 105
+    tubes = FILAMENT.replace("F_ACTIN", "MICROTUBULE") + 'monomer_concentration = "1 uM"\n'
+    (group,) = parse(BOX, filament=tubes).filaments
+    assert group.count == round(602.214 * 8 / 13 * 8 / 600)
+    unknown = FILAMENT.replace('type = "F_ACTIN"', 'name = "OWN"\ndiameter = "7 nm"\npersistence_length = "9 um"')
+    unknown += 'stretching_modulus = "20 nN"\nmonomer_concentration = "1 uM"\n'
+    with pytest.raises(InputError, match='needs the length of a monomer .* monomer_length = "2.7 nm"'):
+        parse(BOX, filament=unknown)
+
+
+LINKERS = '[[linkers]]\ntype = "ALPHA_ACTININ"\ncount = 20\n'
+VOLUMES = {
+    'shape = "sphere"\nradius = "500 nm"': (4 / 3 * np.pi * 0.5**3, 4 / 3 * np.pi * 0.5**3),
+    'shape = "ellipsoid"\nsemi_axes = ["500 nm", "400 nm", "300 nm"]': (0.08 * np.pi, 0.08 * np.pi),
+    'shape = "box"\nlower = ["0 um", "0 um", "0 um"]\nupper = ["1 um", "2 um", "1 um"]': (2.0, 2.0),
+    'shape = "slit"\nthickness = "200 nm"\nnormal = [0, -2, 0]': (None, 0.8),
+    'shape = "cylinder"\nradius = "200 nm"\naxis = [0, 0, 1]': (None, np.pi * 0.08),
+    # Larger than the box, askew, or of one side.
+    'shape = "sphere"\nradius = "1.1 um"': (4 / 3 * np.pi * 1.1**3, None),
+    'shape = "slit"\nthickness = "3 um"': (None, None),
+    'shape = "slit"\nthickness = "200 nm"\nnormal = [1, 1, 0]': (None, None),
+    'shape = "cylinder"\nradius = "1.1 um"': (None, None),
+    'shape = "plane"': (None, None),
+}
+
+
+@pytest.mark.parametrize("wall", VOLUMES)
+def test_linkers_that_are_unbound_are_within_walls(wall):
+    """Without a box and with one of 2 um, whose own volume is not theirs."""
+    table = f'[[wall]]\n{wall}\nstiffness = "0.1 pN/nm"\n'
+    for box, volume in zip(("", BOX), VOLUMES[wall]):
+        if volume is None:
+            with pytest.raises(InputError, match=r"line \d+: .*number 1: Linkers that are not bound .* volume ="):
+                parse(box, table, LINKERS)
+        else:
+            assert parse(box, table, LINKERS).linkers[0].volume == pytest.approx(1e9 * volume)
+        assert parse(box, table, LINKERS + 'volume = "3 um^3"\n').linkers[0].volume == pytest.approx(3e9)
+        with pytest.raises(InputError, match="does not say"):
+            parse(box, table, table, LINKERS)
+
+
 def test_nematic_order_and_lengths_in_turn():
     text = FILAMENT.replace("6", "[3, 5, 3, 8]") + 'count = 401\ndirection = [0, 3, 0]\norientation = "nematic"\n'
     own = built(BOX, filament=text + 'start = "straight"\n')
@@ -520,6 +567,14 @@ def test_mistakes_are_named_with_their_lines(table, old, new, message):
         ('segments = 9\norientation = "nematic"', "orientation needs a direction"),
         ('segments = 9\ncount = 3\nconcentration = "1 uM"', "concentration and count say the same"),
         ('segments = 9\nconcentration = "1 uM"', "concentration needs a volume"),
+        ('segments = 9\nmonomer_concentration = "1 uM"', "monomer_concentration needs a volume"),
+        ('segments = 9\nmonomer_concentration = "1 uM"\nconcentration = "1 uM"', "and concentration say the same"),
+        ('segments = 9\ncount = 3\nmonomer_concentration = "1 uM"', "monomer_concentration and count say the same"),
+        ('segments = 9\nmonomer_length = "2 nm"', "monomer_length belongs to monomer_concentration"),
+        (
+            'segments = 9\nmonomer_concentration = "1 nM"\ninside = { shape = "sphere", radius = "1 um" }',
+            r"makes 0.007652 filaments of 329.7 monomers each in a volume of 4.189 um\^3",
+        ),
         ("segments = [3, 0]", r"segments\[1\] must be at least 1"),
         ("segments = []", "segments must be a list of whole numbers, as in"),
         ("segments = 10000000\ncount = 3", "makes 3e.07 nodes: there can be 1e.07 in all"),

@@ -44,6 +44,7 @@ count = 3
 type = "ALPHA_ACTININ"
 hand = { reach = "60 nm" }
 count = 20
+volume = "8 um^3"
 bound = 10
 [[link]]
 within = "300 nm"

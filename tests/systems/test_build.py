@@ -401,3 +401,11 @@ def test_200_filaments_keep_chains_and_bonds_in_a_file(filaments, tmp_path):
     assert [chain.n_residues for chain in by_mdtraj.chains] == [17] * 200
     assert [(a.index, b.index) for a, b in by_mdtraj.bonds] == expected
     assert [residue.name for residue in by_mdtraj.residues] == (["DNA"] * 17 + ["ACT"] * 17) * 100
+
+
+def test_filaments_say_what_they_are():
+    filaments = Filaments(viscosity=1e-3 * unit.pascal * unit.second, temperature=310 * unit.kelvin)
+    assert repr(filaments) == f"<Filaments at 310 K, {filaments.engine} engine: none yet>"
+    for number in range(3):
+        filaments.add_equilibrium(F_ACTIN, segments=(4, 4, 1)[number], seed=number)
+    assert repr(filaments).endswith("engine: 2 × ACT, 4 segments; 1 × ACT, 1 segment>")

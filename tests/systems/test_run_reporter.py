@@ -24,6 +24,7 @@ from openmm_cylchain import (
 from openmm_cylchain.cli import main
 from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.run import create_simulation
+from openmm_cylchain.units.quantities import PICONEWTON
 from support.small_runs import NETWORK, simulated
 
 WALL = Sphere([0, 0, 0], 2000.0)
@@ -71,7 +72,7 @@ def test_frames_energies_and_description(written):
     np.testing.assert_array_equal(run.steps, 5 * np.arange(6))
     np.testing.assert_allclose(run.positions(-1), positions, atol=1e-3)
     np.testing.assert_allclose(
-        run.energies["bending energy (kJ/mol)"][1:], lengths["bending_energy"].sum(axis=1), rtol=1e-9
+        PICONEWTON * run.energies["bending energy (pN nm)"][1:], lengths["bending_energy"].sum(axis=1), rtol=1e-9
     )
     assert [own.type for own in run.filaments] == [F_ACTIN] * 2 and run.box is None
     (wall,) = run.walls

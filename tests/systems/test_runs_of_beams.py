@@ -9,6 +9,7 @@ from PIL import Image
 from openmm_cylchain import Crosslinks, Filaments, RunReporter, analysis, capsule_contact_force
 from openmm_cylchain.beams.curve import curve_points
 from openmm_cylchain.cli import main
+from openmm_cylchain.units.quantities import PICONEWTON
 from support.contexts import close_reporters, energy_of, forces_of, new_context, positions_of
 from support.linked_beams import BEAM, STRAIGHT
 from support.solvent import KT, TEMPERATURE, VISCOSITY
@@ -42,7 +43,7 @@ def test_a_run_holds_curves_and_links_on_them(simulated):
     run = analysis.load(path)
     assert len(run) == 6 and run.filaments[0].control_points.tolist() == []
     assert run.filaments[2].control_points.tolist() == filaments.control_point_indices[2].tolist()
-    assert run.energies["potential energy (kJ/mol)"][-1] == pytest.approx(energy, rel=1e-6)
+    assert PICONEWTON * run.energies["potential energy (pN nm)"][-1] == pytest.approx(energy, rel=1e-6)
     found = run.crosslinks(-1)
     assert np.linalg.norm(found.places[0, 1] - found.places[0, 0]) == pytest.approx(lengths[0], abs=1e-3)
     assert found.tensions[0] == pytest.approx(0.1 * (lengths[0] - 20.0), abs=1e-3)

@@ -11,7 +11,7 @@ from ...units import quantities as units
 from ..keys import Choice, Either, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
 from ..start_files import read_start
 from ..table import TableKind
-from .filament_types import TYPE_KEYS, read_filament_type
+from .filament_types import MONOMER_LENGTHS, TYPE_KEYS, read_filament_type
 from .shapes import REGION, REGION_EXAMPLE, Region
 
 STARTS = ("equilibrium", "straight")
@@ -24,6 +24,8 @@ _FROM_NODES = (
     "segments",
     "count",
     "concentration",
+    "monomer_concentration",
+    "monomer_length",
     "start",
     "position",
     "direction",
@@ -48,7 +50,20 @@ FILAMENT = TableKind(
             "concentration",
             Quantity(units.NUMBER_DENSITY),
             None,
-            "In place of count: how many there are in the volume of the box, or of inside.",
+            "In place of count: how many filaments there are in the volume of the box, or of inside.",
+        ),
+        Key(
+            "monomer_concentration",
+            Quantity(units.NUMBER_DENSITY),
+            None,
+            "In place of count: that of monomers (of actin, tubulin dimers, base pairs), all of them in filaments.",
+        ),
+        Key(
+            "monomer_length",
+            Quantity(units.LENGTH),
+            None,
+            "Length of a filament per monomer, for monomer_concentration: 2.73 nm of actin, 8/13 nm of microtubules, "
+            "0.34 nm of DNA if not given.",
         ),
         Key(
             "start", Choice(STARTS), None, 'Their shape at first: "equilibrium" if not given, drawn from the exact one.'
@@ -224,7 +239,7 @@ def _placed(entries, kind, box):
     entries.refuse(("topology", "frame", "filaments"), "belongs to a file.")
     entries.refuse(("tangents",), "belongs to nodes.")
     entries.require("segments")
-    entries.only_one("count", "concentration")
+    entries.only_one("count", "concentration", "monomer_concentration")
     entries.only_one("position", "inside")
     region = None if entries["inside"] is None else Region(entries["inside"])
     if "orientation" in entries and "direction" not in entries:
@@ -237,7 +252,7 @@ def _placed(entries, kind, box):
     lengths = entries["segments"] if isinstance(entries["segments"], tuple) else (entries["segments"],)
     if entries["closed"] and min(lengths) < MINIMUM_RING:
         raise entries.at("segments").error(f"must be at least {MINIMUM_RING} in a ring, but is {min(lengths)}.")
-    count = _count(entries, region, box)
+    count = _count(entries, kind, lengths, region, box)
     shares = {}
     for number, length in enumerate(lengths):
         shares[length] = shares.get(length, 0) + (count - number + len(lengths) - 1) // len(lengths)
@@ -270,19 +285,35 @@ def _check_plane(entries):
         raise entries.at("normal").error("must be along z, because these filaments are planar.")
 
 
-def _count(entries, region, box):
-    if "concentration" not in entries:
+def _count(entries, kind, lengths, region, box):
+    monomers = _monomers(entries, kind, lengths)
+    key = "concentration" if monomers is None else "monomer_concentration"
+    if key not in entries:
         return entries["count"] or 1
     if region is None and box is None:
-        raise entries.at("concentration").error(f"needs a volume: add a [box], or inside = {REGION_EXAMPLE}")
+        raise entries.at(key).error(f"needs a volume: add a [box], or inside = {REGION_EXAMPLE}")
     volume = float(np.prod(box)) if region is None else region.volume
-    count = round(entries["concentration"] * volume)
-    if not 1 <= count <= MOST_NODES:
-        raise entries.at("concentration").error(
-            f"makes {count} filaments in a volume of {1e-9 * volume:.4g} um^3: choose it so that there are some, and "
-            f"no more than {MOST_NODES}."
+    exact = entries[key] * volume / (monomers or 1.0)
+    if not 0.5 < exact < MOST_NODES + 0.5:
+        of_monomers = "" if monomers is None else f" of {monomers:.4g} monomers each"
+        raise entries.at(key).error(
+            f"makes {exact:.4g} filaments{of_monomers} in a volume of {1e-9 * volume:.4g} um^3: choose it so that "
+            f"there are some, and no more than {MOST_NODES}."
         )
-    return count
+    return round(exact)
+
+
+def _monomers(entries, kind, lengths):
+    # Of a filament on average, None if their concentration is not given.
+    if "monomer_concentration" not in entries:
+        entries.refuse(("monomer_length",), "belongs to monomer_concentration.")
+        return None
+    each = entries["monomer_length"] or MONOMER_LENGTHS.get(entries["type"])
+    if each is None:
+        raise entries.at("monomer_concentration").error(
+            'needs the length of a monomer of this type: add a line such as monomer_length = "2.7 nm"'
+        )
+    return float(np.mean([kind.segment_lengths(own, entries["closed"]).sum() for own in lengths])) / each
 
 
 def _from_file(entries, kind, box, folder):

@@ -15,6 +15,15 @@ from ..table import TableKind
 PRESETS = {"F_ACTIN": F_ACTIN, "DSDNA": DSDNA, "MICROTUBULE": MICROTUBULE, "DSDNA_BASE_PAIRS": DSDNA_BASE_PAIRS}
 """Filament types by the names that a configuration uses."""
 
+MONOMER_LENGTHS = {
+    "F_ACTIN": 2.73,
+    "DSDNA": 0.34,
+    "MICROTUBULE": 8.0 / 13.0,
+    "DSDNA_BASE_PAIRS": DSDNA_BASE_PAIRS.segment_length,
+}
+"""Lengths in nm per monomer: subunits of actin (Holmes, Popp, Gebhard and Kabsch, Nature 1990, 347, 44), base pairs,
+and dimers of tubulin in 13 protofilaments."""
+
 _CORRECTIONS = TableKind(
     "end_corrections",
     tuple(

@@ -15,6 +15,7 @@ from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Flag, Inline, Key, Number, Pair, Quantity, Text, Whole, point
 from ..table import Entries, TableKind
 from .filament_types import PRESETS as FILAMENT_PRESETS
+from .shapes import volume_within
 from .solvent import EDGES
 
 _QUANTITIES = {
@@ -123,7 +124,10 @@ LINKERS = TableKind(
             "In place of count: concentration of unbound linkers.",
         ),
         Key(
-            "volume", Quantity(units.VOLUME), None, "Volume in which unbound linkers are; that of the box if not given."
+            "volume",
+            Quantity(units.VOLUME),
+            None,
+            "Volume in which unbound linkers are; what the wall and the box leave if not given.",
         ),
         Key("anchors", _Anchors(), None, "Points to which they are tied, one each, in place of their first hands."),
         Key("bound", Whole(0, 10**7, "100"), 0, "How many begin with one hand bound, at random or near anchors."),
@@ -152,11 +156,8 @@ def read_linkers(entries, groups, box, seed, walls=()):
     group = LinkerGroup(_kind(entries), *(entries[name] for name in names), anchors, entries["bound"])
     with entries.naming():
         as_linkers(group.kind, group.count, group.concentration, group.volume, group.anchors, group.bound, 0)
-    if box is None and group.count is not None and group.volume is None:
-        raise entries.error(
-            f"Linkers that are not bound are in a volume: add a periodic [box] with edges = {EDGES.example}, or "
-            'to this table a line such as volume = "1 um^3".'
-        )
+    if group.count is not None and group.volume is None and (box is None or walls):
+        group = dataclasses.replace(group, volume=_volume(entries, [wall.shape for wall in walls], box))
     names = sorted({own.type.name for own in groups})
     for hand in group.kind.hands:
         if box is not None and hand.reach >= 0.5 * min(box):
@@ -176,6 +177,21 @@ def read_linkers(entries, groups, box, seed, walls=()):
                 f'configuration are {", ".join(names)}: change it, as in hand = {{ binds_to = "{names[0]}" }}.'
             )
     return group
+
+
+def _volume(entries, shapes, box):
+    volume = volume_within(shapes, box)
+    if volume is None:
+        reason = (
+            f"which what there is of [[wall]] and [box] does not say: add a [[wall]] that is closed (a sphere, an "
+            f"ellipsoid or a box{'' if box is None else ' that is no larger than the periodic one'}), or"
+            if shapes
+            else f"which nothing says: add a periodic [box] with edges = {EDGES.example}, or"
+        )
+        raise entries.error(
+            f'Linkers that are not bound are in a volume, {reason} to this table a line such as volume = "1 um^3".'
+        )
+    return volume
 
 
 def binds_to(group, linkers):

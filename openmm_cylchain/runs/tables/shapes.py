@@ -80,14 +80,9 @@ class Region:
     @property
     def volume(self):
         """In nm^3."""
-        shape = self._shape
-        if isinstance(shape, Sphere):
-            return 4.0 / 3.0 * np.pi * shape.radius**3
-        if isinstance(shape, Cylinder):
-            return np.pi * shape.radius**2 * self._length
-        if isinstance(shape, Ellipsoid):
-            return 4.0 / 3.0 * np.pi * float(np.prod(shape.semi_axes))
-        return float(np.prod(self._upper - self._lower))
+        if isinstance(self._shape, Cylinder):
+            return np.pi * self._shape.radius**2 * self._length
+        return _closed_volume(self._shape)
 
     @property
     def diameter(self):
@@ -96,13 +91,10 @@ class Region:
 
     def _bounds(self):
         shape = self._shape
-        if isinstance(shape, Box):
-            return shape.lower, shape.upper
         if isinstance(shape, Cylinder):
             reach = 0.5 * self._length * np.abs(shape.axis) + shape.radius * np.sqrt(1.0 - shape.axis**2)
             return shape.point - reach, shape.point + reach
-        reach = shape.semi_axes if isinstance(shape, Ellipsoid) else np.full(3, shape.radius)
-        return shape.center - reach, shape.center + reach
+        return _closed_bounds(shape)
 
     def draw(self, generator):
         """A random point in it: a (3,) array in nm."""
@@ -123,3 +115,40 @@ class Region:
         if self._length is not None:
             inside &= np.abs((np.asarray(positions) - self._shape.point) @ self._shape.axis) <= 0.5 * self._length
         return bool(np.all(inside))
+
+
+def _closed_bounds(shape):
+    if isinstance(shape, Box):
+        return shape.lower, shape.upper
+    reach = shape.semi_axes if isinstance(shape, Ellipsoid) else np.full(3, shape.radius)
+    return shape.center - reach, shape.center + reach
+
+
+def _closed_volume(shape):
+    edges = np.subtract(*_closed_bounds(shape)[::-1])
+    return float(np.prod(edges)) * (1.0 if isinstance(shape, Box) else np.pi / 6.0)
+
+
+def volume_within(shapes, box):
+    """The volume in nm^3 that walls of such shapes and a periodic box with three edges leave; None if nobody knows.
+
+    Of one wall that is closed, and of a slit or cylinder across the box; of several walls it is not known.
+    """
+    if not shapes:
+        return None if box is None else float(np.prod(box))
+    if len(shapes) > 1:
+        return None
+    (shape,) = shapes
+    if isinstance(shape, (Box, Sphere, Ellipsoid)):
+        fits = box is None or np.all(np.subtract(*_closed_bounds(shape)[::-1]) <= box)
+        return _closed_volume(shape) if fits else None
+    if box is None or isinstance(shape, Plane):
+        return None
+    along = np.abs(shape.normal if isinstance(shape, Slab) else shape.axis)
+    axis = int(np.argmax(along))
+    if along[axis] < 1.0 - 1e-12:
+        return None
+    across = np.delete(box, axis)
+    if isinstance(shape, Slab):
+        return float(np.prod(across)) * shape.thickness if shape.thickness <= box[axis] else None
+    return np.pi * shape.radius**2 * box[axis] if 2.0 * shape.radius <= across.min() else None

@@ -1,0 +1,137 @@
+"""The panels of a figure that show filaments and linkers of a frame, projected on the xy plane."""
+
+import itertools
+
+import numpy as np
+from matplotlib.collections import LineCollection
+
+from ..analysis.filament_shapes import filament_curves
+from ..mechanics.geometry import unrolled
+from ..units.text import time_unit
+from .figure_style import FONT_SIZE, legend, length_unit
+
+_PLUS_END = "last node (plus end)"
+_NARROWEST = 0.4
+
+
+class Conformations:
+    """Draws frames of a run, all with one framing.
+
+    Filaments of one [[filament]] table have one colour. In a periodic box, what leaves it goes on at the opposite face.
+
+    Parameters
+    ----------
+    groups : list of (FilamentGroup, members, colour)
+    records : (n,) array
+        Of linkers, see ``LINKER_RECORD``; empty without them.
+    springs : list of (label, colour)
+        Of kinds of linkers.
+    frames : sequence of int
+        Those that are drawn.
+    polar : bool
+        Whether ends are marked.
+    """
+
+    def __init__(self, configuration, groups, trajectory, records, springs, frames, polar):
+        self._box = None if configuration.box is None else np.array(configuration.box)[:2]
+        self._steps = configuration.simulation.steps_per_report
+        self._groups, self._trajectory, self._records = groups, trajectory, records
+        self._springs, self._polar = springs, polar
+        points = [own[:, :2] for frame in frames for _, _, lines in self._lines(frame) for own in lines]
+        points = np.concatenate(points)
+        if self._box is not None:
+            points = np.array([np.zeros(2), self._box])
+        self._lower, self._upper = points.min(axis=0), points.max(axis=0)
+
+    def _lines(self, frame):
+        # Of each group: its label and colour, and the curves of its filaments.
+        for group, members, colour in self._groups:
+            curves = [own[0] for own in filament_curves(self._trajectory[frame], members)]
+            yield group, colour, [unrolled(own) if group.closed else own for own in curves]
+
+    def draw(self, axis, frame):
+        """Draw a frame, with a legend and a scale bar below."""
+        tables, ends = {}, []
+        for group, colour, lines in self._lines(frame):
+            segments = np.concatenate([np.stack([own[:-1, :2], own[1:, :2]], axis=1) for own in lines])
+            label = None if group.table in tables else self._label(group)
+            self._draw_segments(axis, segments, tables.setdefault(group.table, colour), 1.8, 2, label)
+            ends += [] if group.closed else [(own[-1, :2], colour) for own in lines]
+        if self._polar and ends:
+            places = np.array([place for place, _ in ends])
+            places = places if self._box is None else np.mod(places, self._box)
+            axis.plot(*places.T, "o", color="black", markersize=3.5, zorder=3, label=_PLUS_END)
+        step = self._records["step"] == frame % len(self._trajectory) * self._steps
+        for number, (label, colour) in enumerate(self._springs):
+            own = self._records[step & (self._records["type"] == number)]
+            places = own["places"][~np.isnan(own["places"]).any(axis=(1, 2))].astype(float)
+            label = f"{label}, both hands bound" if len(places) else None
+            self._draw_segments(axis, places[:, :, :2], colour, 1.6, 4, label)
+        self._frame(axis)
+        time = self._trajectory.time[frame]
+        name, length = time_unit(time)
+        when = f"at {time / length:.4g} {name.replace('us', 'µs')}" if time > 0.0 else "at the start"
+        axis.set_title(f"Filaments {when}, projected on the xy plane")
+        legend(axis, loc="upper left", bbox_to_anchor=(0.0, -0.01), borderaxespad=0.0)
+        _draw_scale_bar(axis)
+
+    def _label(self, group):
+        own = [one for one, *_ in self._groups if one.table == group.table]
+        counts = sorted({one.segments for one in own})
+        kind = group.type.segment_kind.name + "s" * (counts != [1])
+        text = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+        return f"{sum(one.count for one in own)} × {group.type.name}, {text} {kind}"
+
+    def _draw_segments(self, axis, segments, colour, width, order, label):
+        if self._box is not None and len(segments):
+            # At every image that one of its ends is in; the frame cuts off the rest.
+            cells = np.floor(segments / self._box)
+            images = [np.stack([cells[:, x, 0], cells[:, y, 1]], axis=1) for x, y in itertools.product((0, 1), (0, 1))]
+            segments = np.concatenate([segments - (own * self._box)[:, None] for own in images])
+            segments = np.unique(segments, axis=0)
+        lines = LineCollection(segments, colors=colour, linewidths=width, zorder=order, capstyle="round")
+        axis.add_collection(lines, autolim=False)
+        if label is not None:
+            axis.plot([], [], color=colour, linewidth=width, label=label)
+
+    def _frame(self, axis):
+        center, half = 0.5 * (self._lower + self._upper), 0.5 * (self._upper - self._lower)
+        if self._box is None:
+            # With a margin, and no narrower than two fifths of its width or height.
+            half = np.maximum(half, _NARROWEST * half.max()) + 0.05 * half.max()
+        axis.set_xlim(center[0] - half[0], center[0] + half[0])
+        axis.set_ylim(center[1] - half[1], center[1] + half[1])
+        axis.set_aspect("equal")
+        axis.set_xticks([])
+        axis.set_yticks([])
+        for spine in axis.spines.values():
+            spine.set_color("0.7")
+
+
+def _draw_scale_bar(axis):
+    # As long as a round number that is closest below a quarter of the width, below the frame on the right.
+    axis.apply_aspect()
+    width = np.diff(axis.get_xlim())[0]
+    decade = 10.0 ** np.floor(np.log10(width / 4))
+    length = max(step * decade for step in (1, 2, 5) if step * decade <= width / 4)
+    unit, scale = length_unit(length)
+    transform = axis.transAxes
+    fraction = length / width
+    axis.plot(
+        [1.0 - fraction, 1.0],
+        [-0.03, -0.03],
+        color="black",
+        linewidth=3,
+        transform=transform,
+        clip_on=False,
+        solid_capstyle="butt",
+    )
+    axis.text(
+        1.0 - fraction / 2,
+        -0.045,
+        f"{length / scale:g} {unit}",
+        transform=transform,
+        ha="center",
+        va="top",
+        fontsize=FONT_SIZE,
+    )
