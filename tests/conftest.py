@@ -13,6 +13,8 @@ import openmm
 import pytest
 
 import openmm_cylchain
+from openmm_cylchain import InputError
+from openmm_cylchain.engine_choice import why_no_python_forces
 from support.platforms import COMPILED_PLATFORMS, ENGINES, GPU_NAMES, NOT_TESTED, PLATFORMS
 
 
@@ -53,6 +55,18 @@ def pytest_collection_modifyitems(config, items):
         for test, has_case in has_cases.items():
             if not has_case:
                 raise pytest.UsageError(f"{test}: its sample is none of its cases")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_pyfunc_call():
+    """Where OpenMM has no forces that are computed in Python, what is refused for that reason is skipped with it."""
+    reason = why_no_python_forces()
+    try:
+        return (yield)
+    except InputError as error:
+        if reason is None or reason not in str(error):
+            raise
+        pytest.skip(str(error))
 
 
 @pytest.fixture(params=PLATFORMS, scope="session")
