@@ -13,7 +13,6 @@ import openmm
 import pytest
 
 import openmm_cylchain
-from openmm_cylchain import InputError
 from openmm_cylchain.engine_choice import why_no_python_forces
 from support.platforms import COMPILED_PLATFORMS, ENGINES, GPU_NAMES, NOT_TESTED, PLATFORMS
 
@@ -60,13 +59,24 @@ def pytest_collection_modifyitems(config, items):
 @pytest.hookimpl(wrapper=True)
 def pytest_pyfunc_call():
     """Where OpenMM has no forces that are computed in Python, what is refused for that reason is skipped with it."""
+    return (yield from _skipped_without_python_forces())
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_fixture_setup():
+    """The same of fixtures."""
+    return (yield from _skipped_without_python_forces())
+
+
+def _skipped_without_python_forces():
     reason = why_no_python_forces()
     try:
         return (yield)
-    except InputError as error:
+    except Exception as error:
+        # The text is also that of a process that a test has started.
         if reason is None or reason not in str(error):
             raise
-        pytest.skip(str(error))
+        pytest.skip(reason)
 
 
 @pytest.fixture(params=PLATFORMS, scope="session")

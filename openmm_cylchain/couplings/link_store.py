@@ -82,6 +82,7 @@ def not_of_this_system() -> InputError:
 def parameters_of(force: openmm.Force, beginning: str) -> list[Any]:
     """Names of the global parameters of a PythonForce that begin in some way."""
     # OpenMM has them since 8.5.
-    if not isinstance(force, getattr(openmm, "PythonForce", ())):
+    kind: Any = getattr(openmm, "PythonForce", ())
+    if not isinstance(force, kind):
         return []
     return [name for name in dict(force.getGlobalParameters()) if name.startswith(beginning)]

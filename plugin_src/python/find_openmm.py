@@ -2,9 +2,9 @@
 
 The package openmm is found, but not imported: a build may have libraries that this machine cannot load.
 
-As a program, it prints the version of OpenMM, the directory of its headers and libraries, and the directories of packages
-in which its platforms for GPUs, and what these need, may be, as a CMake list. As a provider of metadata, it asks for the
-minor version of OpenMM that is there: that is part of the binary interface of the plugin.
+As a program, it prints the version of OpenMM, its Python module, the directory of its headers and libraries, and the
+directories of packages in which its platforms for GPUs, and what these need, may be, as a CMake list. As a provider of
+metadata, it asks for the minor version of OpenMM that is there: that is part of the binary interface of the plugin.
 """
 
 import runpy
@@ -52,13 +52,15 @@ def dynamic_wheel(settings):
 
 def main():
     version, package = find_openmm()
+    (module,) = package.glob("_openmm.*so")
     libraries = package.parent / "OpenMM.libs"
     # That of conda lies in its environment, with all other libraries.
     if not libraries.is_dir():
         libraries = Path(sys.prefix)
     # A build may have packages in several directories.
-    sites = [Path(entry) for entry in sys.path if any(Path(entry, name).is_dir() for name in ("OpenMM.libs", "nvidia"))]
-    print(version, libraries.as_posix(), *(site.as_posix() for site in sites), sep=";")
+    names = ("openmm", "OpenMM.libs", "nvidia")
+    sites = [Path(entry) for entry in sys.path if any(Path(entry, name).is_dir() for name in names)]
+    print(version, *(path.as_posix() for path in (module, libraries, *sites)), sep=";")
 
 
 if __name__ == "__main__":

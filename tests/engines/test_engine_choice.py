@@ -128,7 +128,9 @@ def test_what_needs_python_forces_is_refused(without_python_forces, without_comp
     sentence = "it needs OpenMM 8.5 or newer, but OpenMM 8.4 is installed: install a newer one"
     with pytest.raises(InputError, match=f"The portable engine is missing: {sentence}"):
         Filaments(1.0, 300.0, engine="portable")
-    with pytest.raises(InputError, match=f"No engine works here. The compiled .* not part .* The portable .* {sentence}"):
+    with pytest.raises(
+        InputError, match=f"No engine works here. The compiled .* not part .* The portable .* {sentence}"
+    ):
         Filaments(1.0, 300.0)
     system = openmm.System()
     links = Crosslinks(stiffness=10.0, rest_length=1.0)
