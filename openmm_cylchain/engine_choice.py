@@ -38,6 +38,8 @@ def choose_engine(name: str | None = None) -> str:
         raise InputError(f"engine must be one of {', '.join(ENGINES)}, but is {name!r}.")
     reasons = available_engines()
     if name is None:
+        if None not in reasons.values():
+            raise InputError(f"No engine works here. {' '.join(_is_missing(each, reasons[each]) for each in ENGINES)}")
         reason = reasons["compiled"]
         if reason not in (None, _NOT_INSTALLED):
             # The line that makes the Filaments, which come in layers.
@@ -45,13 +47,27 @@ def choose_engine(name: str | None = None) -> str:
         return next(each for each in ENGINES if reasons[each] is None)
     reason = reasons[name]
     if reason is not None:
-        raise InputError(f"The {name} engine is missing: {reason.rstrip('.')}.")
+        raise InputError(_is_missing(name, reason))
     return name
 
 
 def available_engines() -> dict[str, str | None]:
     """The name of every engine with None if it works here, or with the reason why it does not."""
-    return {"portable": None, "compiled": _why_compiled_is_missing()}
+    return {"portable": why_no_python_forces(), "compiled": _why_compiled_is_missing()}
+
+
+def _is_missing(engine, reason):
+    return f"The {engine} engine is missing: {reason.rstrip('.')}."
+
+
+def why_no_python_forces() -> str | None:
+    """Why OpenMM has no forces that are computed in Python, and what to do; None if it has them."""
+    if hasattr(openmm, "PythonForce"):
+        return None
+    return (
+        f"it needs OpenMM 8.5 or newer, but OpenMM {openmm.Platform.getOpenMMVersion()} is installed: install a newer "
+        "one, and then openmm_cylchain again"
+    )
 
 
 def prepare_openmm() -> None:
@@ -83,9 +99,12 @@ def why_openmm_differs() -> str | None:
 
 
 def _about_slow_engine(reason):
-    return (
-        f"The compiled engine does not work: {reason.rstrip('.')}. The portable engine is taken in its place, whose "
-        'steps are a thousand times as short; engine="portable" asks for it without this warning.'
+    instead = why_no_python_forces()
+    return f"The compiled engine does not work: {reason.rstrip('.')}. " + (
+        "The portable engine is taken in its place, whose steps are a thousand times as short; "
+        'engine="portable" asks for it without this warning.'
+        if instead is None
+        else f"Neither does the portable engine: {instead}."
     )
 
 

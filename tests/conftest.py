@@ -13,6 +13,7 @@ import openmm
 import pytest
 
 import openmm_cylchain
+from openmm_cylchain.engine_choice import why_no_python_forces
 from support.platforms import COMPILED_PLATFORMS, ENGINES, GPU_NAMES, NOT_TESTED, PLATFORMS
 
 
@@ -53,6 +54,29 @@ def pytest_collection_modifyitems(config, items):
         for test, has_case in has_cases.items():
             if not has_case:
                 raise pytest.UsageError(f"{test}: its sample is none of its cases")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_pyfunc_call():
+    """Where OpenMM has no forces that are computed in Python, what is refused for that reason is skipped with it."""
+    return (yield from _skipped_without_python_forces())
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_fixture_setup():
+    """The same of fixtures."""
+    return (yield from _skipped_without_python_forces())
+
+
+def _skipped_without_python_forces():
+    reason = why_no_python_forces()
+    try:
+        return (yield)
+    except Exception as error:
+        # The text is also that of a process that a test has started.
+        if reason is None or reason not in str(error):
+            raise
+        pytest.skip(reason)
 
 
 @pytest.fixture(params=PLATFORMS, scope="session")

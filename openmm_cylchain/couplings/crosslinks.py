@@ -163,7 +163,8 @@ class Crosslinks:
         ------
         InputError
             If these crosslinks are in a System already, or join particles that it does not have; if one of them is
-            longer at rest than nearest images can be apart.
+            longer at rest than nearest images can be apart; if OpenMM is older than 8.5 and the System has no filaments
+            of the compiled engine.
         """
         if self._store is not None:
             raise InputError("These crosslinks are already in a System; make another Crosslinks for another System.")

@@ -81,6 +81,8 @@ def not_of_this_system() -> InputError:
 
 def parameters_of(force: openmm.Force, beginning: str) -> list[Any]:
     """Names of the global parameters of a PythonForce that begin in some way."""
-    if not isinstance(force, openmm.PythonForce):
+    # OpenMM has them since 8.5.
+    kind: Any = getattr(openmm, "PythonForce", ())
+    if not isinstance(force, kind):
         return []
     return [name for name in dict(force.getGlobalParameters()) if name.startswith(beginning)]

@@ -8,6 +8,8 @@ import xml.etree.ElementTree as ElementTree
 
 import openmm
 
+from ..engine_choice import why_no_python_forces
+from ..errors import InputError
 from ..units.types import FloatArray
 from .crosslink_computation import CrosslinkComputation
 from .crosslink_tables import TABLES, CrosslinkTable
@@ -42,7 +44,13 @@ class PortableLinks(LinkStore):
         periodic: bool,
         defaults: tuple[float, float, float],
     ) -> "tuple[PortableLinks, openmm.Force]":
-        """Make the force of a System."""
+        """Make the force of a System; InputError if OpenMM has no forces that are computed in Python."""
+        missing = why_no_python_forces()
+        if missing is not None:
+            raise InputError(
+                "Without filaments of the compiled engine in the System, crosslinks are computed in Python: "
+                f"{missing}, or add the filaments to the System before its crosslinks."
+            )
         taken = [name for force in system.getForces() for name in parameters_of(force, _PARAMETER)]
         parameter = f"{_PARAMETER}_{len(taken)}"
         computation = CrosslinkComputation(parameter, model, initial, periodic, defaults)

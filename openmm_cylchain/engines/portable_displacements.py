@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 import openmm
 
+from ..couplings.link_store import parameters_of
 from ..couplings.periodicity import is_periodic
 from ..errors import InputError, InstabilityError, note_raised_in_force
 from ..mechanics.broken_segment import find_broken_segment
@@ -252,7 +253,7 @@ def add_redistribution(system, computation):
 
 def _is_redistribution(force):
     # By its parameters: XML files written by OpenMM 8.5 lose the names of PythonForces.
-    return isinstance(force, openmm.PythonForce) and PHASE in dict(force.getGlobalParameters())
+    return PHASE in parameters_of(force, PHASE)
 
 
 def check_redistribution(system, group):

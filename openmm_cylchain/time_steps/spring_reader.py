@@ -9,6 +9,7 @@ from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..couplings.chain_forces import is_chain_force
 from ..couplings.contacts import CONTACT_STIFFNESS, is_contact_force
 from ..couplings.crosslinks import Crosslinks
+from ..couplings.link_store import parameters_of
 from ..couplings.native_links import is_link_force
 from ..couplings.pulling import is_constant_force
 from ..couplings.walls import WALL_NAME, as_filament_wall_force
@@ -70,10 +71,7 @@ class SpringReader:
             return self._external(force, label)
         if is_contact_force(force):
             return self._contacts(force, label)
-        if isinstance(force, openmm.PythonForce):
-            if any(name.startswith("cylinder_chain") for name in dict(force.getGlobalParameters())):
-                return []
-        return None
+        return [] if parameters_of(force, "cylinder_chain") else None
 
     def _crosslinks(self, links, label):
         table = links.table(None)

@@ -2,7 +2,6 @@
 # OpenMM's library of the platform, with its headers, and the headers of what it runs on. What they lack is said in
 # platforms.txt, which is installed, and never stops the build.
 
-get_filename_component(OPENMM_LIBRARIES "${OPENMM_LIBRARY}" DIRECTORY)
 set(COMMON_KERNELS layout constants vectors noise potentials workspace workItems stages tensionBand equations metricForces
     solverOfItem solverOfGroup implicitStep explicitStep chainForces chainKernels particles couplings contacts)
 list(TRANSFORM COMMON_KERNELS PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/platforms/common/kernels/")

@@ -192,6 +192,7 @@ def test_commands_exist_with_these_options(capsys):
                 "pip",
                 "pytest",
                 "apt",
+                "conda",
                 "cmake",
                 "ctest",
                 "pre-commit",

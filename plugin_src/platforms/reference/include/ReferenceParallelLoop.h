@@ -5,6 +5,7 @@
 #include "openmm/internal/ParallelLoop.h"
 #include "openmm/internal/ThreadPool.h"
 #include "mechanics/Loop.h"
+#include <memory>
 
 namespace OpenMM {
 
@@ -22,6 +23,7 @@ public:
      */
     void runMany(const std::function<void(const cylchain::Loop& loop)>& function);
 private:
+    std::unique_ptr<ThreadPool> ownThreads;
     ThreadPool* threads;
 };
 

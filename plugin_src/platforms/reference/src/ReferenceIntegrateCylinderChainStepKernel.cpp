@@ -169,7 +169,11 @@ void ReferenceIntegrateCylinderChainStepKernel::move(ContextImpl& context, const
 void ReferenceIntegrateCylinderChainStepKernel::exchangePositions(ContextImpl& context, double time, int steps) {
     ReferencePlatform::PlatformData& data = extractData(context);
     data.positions->swap(newPositions);
+#if CYLCHAIN_OPENMM_VERSION >= 804
     data.virtualSites->computePositions(context.getSystem(), *data.positions, data.periodicBoxVectors);
+#else
+    data.virtualSites->computePositions(context.getSystem(), *data.positions);
+#endif
     data.time += time;
     data.stepCount += steps;
 }

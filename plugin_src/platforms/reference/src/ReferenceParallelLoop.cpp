@@ -112,8 +112,15 @@ private:
 
 ReferenceParallelLoop::ReferenceParallelLoop(ContextImpl& context) : threads(NULL) {
     const vector<string>& properties = context.getPlatform().getPropertyNames();
-    if (find(properties.begin(), properties.end(), "Threads") != properties.end())
-        threads = &reinterpret_cast<ReferencePlatform::PlatformData*>(context.getPlatformData())->threads;
+    if (find(properties.begin(), properties.end(), "Threads") == properties.end())
+        return;
+#if CYLCHAIN_OPENMM_VERSION >= 804
+    threads = &reinterpret_cast<ReferencePlatform::PlatformData*>(context.getPlatformData())->threads;
+#else
+    // The threads of the platform are its own.
+    ownThreads = make_unique<ThreadPool>(stoi(context.getPlatform().getPropertyValue(context.getOwner(), "Threads")));
+    threads = ownThreads.get();
+#endif
 }
 
 void ReferenceParallelLoop::run(int count, const function<void(int)>& iteration) {
