@@ -81,8 +81,7 @@ def margins(scene: Scene, cameras: Callable[[Margins], Iterable[Camera]], size: 
         return bare
     corner = legend.get_window_extent(canvas.get_renderer())
     for camera in cameras(bare):
-        seen = camera.seen(scene.points)
-        across, up = (camera.distance * camera.scale * seen[:, :2] / -seen[:, 2:]).T
+        across, up = camera.places(scene.points).T
         if np.any((across < corner.x1 - 0.5 * camera.width) & (up > corner.y0 - 0.5 * height)):
             return Margins(min(math.ceil(corner.x1), width // 3), bare.right)
     return bare

@@ -139,6 +139,45 @@ def test_films_show_all_filaments(two_types, direction):
     assert np.all(np.abs(places) < [160, 120])
 
 
+@pytest.mark.parametrize(
+    "axis", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0), (-0.4, 0.8, -0.4)]
+)
+def test_what_is_thin_is_seen_from_its_side(axis):
+    axis = np.array(axis) / np.linalg.norm(axis)
+    across = np.linalg.svd(axis[None])[2][1:]
+    turn = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    circle = np.stack([np.cos(turn), np.sin(turn)], axis=1) @ across
+    points = np.concatenate([100.0 * height * axis + 5.0 * circle for height in np.linspace(-1.0, 1.0, 9)])
+    camera = camera_on(points, (960, 720))
+    assert abs(camera.axes[2] @ axis) < 0.01
+    # It fills the picture in one direction.
+    assert np.max(np.abs(camera.places(points)).max(axis=0) / [480, 360]) == pytest.approx(0.88)
+
+
+def test_pictures_of_thin_things_are_thin(tmp_path):
+    """Pictures are no larger than what they show needs, unless a size is given."""
+    text = """[[filament]]
+        type = "F_ACTIN"
+        segments = 10
+        start = "straight"
+        direction = {}
+        [simulation]
+        time_step = "1 us"
+        duration = "10 us"
+        report_interval = "10 us"
+        seed = 1
+    """
+    sizes = {"[1, 0, 0]": (360, 960, 3), "[0, 0, 1]": (720, 480, 3)}
+    for direction, size in sizes.items():
+        run = simulated(tmp_path, text.format(direction))
+        image = picture(run, tmp_path)
+        assert image.shape == size
+        # Along its length, it fills the picture.
+        lit = np.flatnonzero(np.any(np.ptp(image, axis=2) > 60, axis=0 if size[0] < size[1] else 1))
+        assert np.ptp(lit) > 0.8 * max(size)
+        assert picture(run, tmp_path, *SIZE).shape == (120, 160, 3)
+
+
 @pytest.mark.parametrize("color", COLORINGS)
 def test_colorings(two_types, color):
     run = analysis.load(two_types)
