@@ -48,6 +48,15 @@ def test_a_network_is_shown_at_its_start_and_at_its_end(drawn):
     assert len(order) == len(run) and 0.0 <= joined.min() and joined.max() <= 1.0
 
 
+def test_legends_do_not_hide_scale_bars(drawn):
+    axes, _ = drawn
+    for axis in axes[:2]:
+        (length,) = axis.texts
+        bar = axis.lines[-1]
+        for own in (length, bar):
+            assert not axis.get_legend().get_window_extent().overlaps(own.get_window_extent())
+
+
 def test_filaments_and_linkers_are_within_the_box(drawn):
     """What leaves it goes on at the opposite face, and so do linkers: they lie on filaments."""
     axes, run = drawn
