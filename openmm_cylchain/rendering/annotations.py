@@ -98,7 +98,8 @@ def _draw_legend(figure, scene, text):
     handles = []
     for label, color, kind in scene.legend:
         if kind == "filament":
-            label = _FULL_NAMES.get(label, label)
+            name, comma, load = label.partition(", ")
+            label = _FULL_NAMES.get(name, name) + comma + load
             handles.append(Line2D([], [], color=color, linewidth=0.45 * text, solid_capstyle="round", label=label))
         elif kind == "particle":
             marker = dict(marker="o", markersize=0.8 * text, linestyle="none")

@@ -83,7 +83,9 @@ class Conformations:
         counts = sorted({one.segments for one in own})
         kind = group.type.segment_kind.name + "s" * (counts != [1])
         text = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-        return f"{sum(one.count for one in own)} × {group.type.name}, {text} {kind}"
+        label = f"{sum(one.count for one in own)} × {group.type.name}, {text} {kind}"
+        differ = len({one.load for one, *_ in self._groups}) > 1
+        return f"{label}, {group.load}" if differ and group.load else label
 
     def _draw_segments(self, axis, segments, colour, width, order, label):
         if self._box is not None and len(segments):

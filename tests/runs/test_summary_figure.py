@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from openmm_cylchain import analysis
 from openmm_cylchain.output.colors import spring_colors
 from openmm_cylchain.rendering.colors import filament_colors, linker_colors
-from support.small_runs import NETWORK, simulated
+from support.small_runs import NETWORK, TWO_LOADS, simulated
 
 
 @pytest.fixture(scope="module")
@@ -123,3 +123,12 @@ def rgb_to_luminance(name):
     channels = np.array(to_rgb(name))
     linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
     return linear @ [0.2126, 0.7152, 0.0722]
+
+
+def test_loads_are_named(tmp_path, monkeypatch):
+    figures, savefig = [], Figure.savefig
+    monkeypatch.setattr(
+        Figure, "savefig", lambda own, *rest, **options: (figures.append(own), savefig(own, *rest, **options))
+    )
+    simulated(tmp_path, TWO_LOADS)
+    assert labels_of(figures[0].axes[0]) == ["2 × DNA, 5 segments, 0.2 pN", "1 × DNA, 5 segments, 10 pN"]
