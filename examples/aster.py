@@ -107,8 +107,8 @@ released = course(*disc("release"))
 seconds = interval * STEP.value_in_unit(unit.second)
 time = seconds * np.arange(len(held))
 curves = {
-    "plus ends, motors that hold at ends": ([neighbours(one[:, -1]) for one in held], "#c0392b", "-"),
-    "minus ends": ([neighbours(one[:, 0]) for one in held], "#1f6f8b", "-"),
+    "plus ends, motors that hold at ends": ([neighbours(one[:, -1]) for one in held], "#101010", "-"),
+    "minus ends": ([neighbours(one[:, 0]) for one in held], "#0072B2", "-"),
     "plus ends, motors that let go": ([neighbours(one[:, -1]) for one in released], "0.5", "--"),
 }
 print(f"{steps} steps of {STEP}, {100 * divided:.2g} % of them divided; {time[-1]:.3g} s")
@@ -124,14 +124,14 @@ titles = ("At first", f"After {time[-1]:.3g} s", f"After {time[-1]:.3g} s, motor
 for axes, shape, title in zip(discs, (held[0], held[-1], released[-1]), titles):
     axes.plot(RADIUS / 1000 * np.cos(turn), RADIUS / 1000 * np.sin(turn), color="0.7", linewidth=1)
     for own in shape:
-        axes.plot(*own[:, :2].T, color="#1f6f8b", linewidth=1.3, alpha=0.85)
-    axes.plot(*shape[:, -1, :2].T, "o", color="#c0392b", markersize=4, zorder=3)
+        axes.plot(*own[:, :2].T, color="#0072B2", linewidth=1.3, alpha=0.85)
+    axes.plot(*shape[:, -1, :2].T, "o", color="#101010", markersize=4, zorder=3)
     axes.set(aspect="equal", xlabel="x (µm)")
     axes.set_title(title, fontsize=11)
     axes.spines[["top", "right"]].set_visible(False)
 discs[0].set_ylabel("y (µm)")
-discs[0].plot([], [], color="#1f6f8b", linewidth=1.5, label="microtubule")
-discs[0].plot([], [], "o", color="#c0392b", markersize=4, label="its plus end")
+discs[0].plot([], [], color="#0072B2", linewidth=1.5, label="microtubule")
+discs[0].plot([], [], "o", color="#101010", markersize=4, label="its plus end")
 top.legend(*discs[0].get_legend_handles_labels(), frameon=False, loc="outside lower center", ncols=2)
 panel, zoom = bottom.subplots(1, 2, width_ratios=(1.6, 1))
 for label, (counts, colour, style) in curves.items():
@@ -142,11 +142,11 @@ panel.spines[["top", "right"]].set_visible(False)
 ends = held[-1][:, -1, :2]
 densest = ends[np.argmax([np.sum(np.linalg.norm(ends - one, axis=1) < NEAR) for one in ends])]
 for own in held[-1]:
-    zoom.plot(*own[:, :2].T, color="#1f6f8b", linewidth=1.6)
-    zoom.plot(*own[-1, :2], "o", color="#c0392b", markersize=5, zorder=3)
-zoom.plot(*pulls.places[..., :2].T / 1000, color="#e67e22", linewidth=1.2, zorder=4)
-zoom.plot(*pulls.places[..., :2].reshape(-1, 2).T / 1000, ".", color="#e67e22", markersize=3, zorder=4)
-zoom.plot([], [], ".-", color="#e67e22", label="motors")
+    zoom.plot(*own[:, :2].T, color="#0072B2", linewidth=1.6)
+    zoom.plot(*own[-1, :2], "o", color="#101010", markersize=5, zorder=3)
+zoom.plot(*pulls.places[..., :2].T / 1000, color="#B3261E", linewidth=1.2, zorder=4)
+zoom.plot(*pulls.places[..., :2].reshape(-1, 2).T / 1000, ".", color="#B3261E", markersize=3, zorder=4)
+zoom.plot([], [], ".-", color="#B3261E", label="motors")
 zoom.legend(loc="upper right")
 zoom.set(xlim=densest[0] + np.array([-0.2, 0.2]), ylim=densest[1] + np.array([-0.18, 0.18]), aspect="equal")
 zoom.set(xlabel="x (µm)", ylabel="y (µm)", title="The middle of the aster")

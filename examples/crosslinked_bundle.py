@@ -158,7 +158,7 @@ figure.colorbar(lines, ax=panels[:2], label="force of a crosslink (pN)", extend=
 panels[2].plot(report.step * milliseconds, report.count, color="0.25", linewidth=1.6)
 panels[2].set(xlabel="time (ms)", ylabel="crosslinks", xlim=(0, steps * milliseconds), ylim=(0, None))
 panels[2].axvspan(loaded_at * milliseconds, steps * milliseconds, color="0.93", zorder=0)
-panels[2].text(BOUND + 0.01, 0.5, f"load {LOAD / PICONEWTON:g} pN", color="0.4", transform=panels[2].transAxes)
+panels[2].text(BOUND + 0.01, 0.3, f"load {LOAD / PICONEWTON:g} pN", color="0.4", transform=panels[2].transAxes)
 right = panels[2].twinx()
 right.plot(milliseconds * np.arange(1, steps + 1), np.array(slid) / 1000, color="#c0392b", linewidth=1.6)
 right.set_ylabel("slid apart (µm)", color="#c0392b")

@@ -99,19 +99,19 @@ def wrapped(path):
 
 plane.plot(*anchors[:, :2].T / 1000, ".", color="0.8", markersize=1.5, zorder=0)
 pulls = here.linker_pulls()
-plane.plot(*np.mod(pulls.places[:, 0, :2], BOX).T / 1000, ".", color="#e67e22", markersize=4, zorder=3)
+plane.plot(*np.mod(pulls.places[:, 0, :2], BOX).T / 1000, ".", color="#B3261E", markersize=4, zorder=3)
 for number in range(FILAMENTS):
     trace = frames[:, number].mean(axis=1)
-    plane.plot(*wrapped(trace).T, color="#1f6f8b", linewidth=1, alpha=0.35)
+    plane.plot(*wrapped(trace).T, color="#0072B2", linewidth=1, alpha=0.35)
     fine = np.concatenate([np.linspace(a, b, 20) for a, b in zip(frames[-1, number], frames[-1, number][1:])])
-    plane.plot(*wrapped(fine).T, color="#1f6f8b", linewidth=2.6, solid_capstyle="round")
+    plane.plot(*wrapped(fine).T, color="#0072B2", linewidth=2.6, solid_capstyle="round")
     tip = np.mod(frames[-1, number, 0], BOX) / 1000
     ahead = 0.12 * directions[-1, number]
-    arrow = {"arrowstyle": "-|>", "color": "#1f6f8b", "linewidth": 0, "mutation_scale": 16}
+    arrow = {"arrowstyle": "-|>", "color": "#0072B2", "linewidth": 0, "mutation_scale": 16}
     plane.annotate("", tip + ahead, tip - ahead, arrowprops=arrow)
-plane.plot([], [], color="#1f6f8b", linewidth=2.6, label="microtubule, minus end in front")
-plane.plot([], [], color="#1f6f8b", linewidth=1, alpha=0.35, label="path of its middle")
-plane.plot([], [], ".", color="#e67e22", markersize=8, label="motor that holds one")
+plane.plot([], [], color="#0072B2", linewidth=2.6, label="microtubule, minus end in front")
+plane.plot([], [], color="#0072B2", linewidth=1, alpha=0.35, label="path of its middle")
+plane.plot([], [], ".", color="#B3261E", markersize=8, label="motor that holds one")
 plane.plot([], [], ".", color="0.8", markersize=6, label="other motors")
 plane.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
 plane.set(aspect="equal", xlabel="x (µm)", ylabel="y (µm)", xlim=(0, BOX / 1000), ylim=(0, BOX / 1000))
@@ -121,8 +121,8 @@ mean = np.array([np.convolve(path, np.ones(window) / window, "valid") for path i
 time = seconds * (1 + np.arange(mean.shape[1]) + 0.5 * window)
 panel.plot(time, mean.T, color="0.75", linewidth=0.8)
 panel.plot([], [], color="0.75", linewidth=1, label="each filament")
-panel.plot(time, mean.mean(axis=0), color="#1f6f8b", linewidth=2.2, label="mean of all filaments")
-panel.axhline(SPEED, color="#e67e22", linestyle="--", linewidth=1.8, label="speed of motors without load")
+panel.plot(time, mean.mean(axis=0), color="#0072B2", linewidth=2.2, label="mean of all filaments")
+panel.axhline(SPEED, color="#B3261E", linestyle="--", linewidth=1.8, label="speed of motors without load")
 panel.set(xlabel="time (s)", ylim=(0, 1.6 * SPEED), xlim=(0, time[-1] + seconds))
 panel.set_ylabel(f"speed along the filament, over {window * seconds:.2g} s (µm/s)")
 panel.legend(frameon=False, loc="lower right")

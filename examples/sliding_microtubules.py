@@ -98,7 +98,7 @@ print(f"parallel: {np.abs(speeds[PAIRS // 2 :]).mean():.3f} um/s")
 figure, ((before, after), (panel, detail)) = plt.subplots(
     2, 2, figsize=(12, 8.4), height_ratios=(1.4, 1), layout="constrained"
 )
-colours = ("#c0392b", "#1f6f8b")
+colours = ("#0072B2", "#56B4E9")
 pulls = here.linker_pulls()
 for axes, shape, title in ((before, frames[0], "Before"), (after, frames[-1], f"After {time[-1]:.3g} s")):
     for own in shape:
@@ -107,18 +107,18 @@ for axes, shape, title in ((before, frames[0], "Before"), (after, frames[-1], f"
         axes.plot(*own[-1, :2], marker=">" if right else "<", color=colours[int(right)], markersize=6)
     axes.set_title(title, loc="left", fontsize=11)
     axes.set(aspect="equal", ylabel="y (µm)", xlabel="x (µm)")
-after.add_collection(LineCollection(pulls.places[..., :2] / 1000, colors="#e67e22", linewidths=1.2, zorder=3))
+after.add_collection(LineCollection(pulls.places[..., :2] / 1000, colors="#B3261E", linewidths=1.2, zorder=3))
 limits = [(frames[[0, -1], ..., axis].min() - 0.2, frames[[0, -1], ..., axis].max() + 0.2) for axis in (0, 1)]
 for axes in (before, after):
     axes.set(xlim=limits[0], ylim=limits[1])
 for colour, label in zip(colours, ("plus end on the left", "plus end on the right")):
     before.plot([], [], color=colour, linewidth=1.8, label=label)
-before.plot([], [], color="#e67e22", linewidth=1.5, label="motor")
+before.plot([], [], color="#B3261E", linewidth=1.5, label="motor")
 before.legend(frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0.12, 1.0))
 for pair, path in enumerate(apart.T):
     antiparallel = pair < PAIRS // 2
     label = ("antiparallel" if antiparallel else "parallel") if pair % (PAIRS // 2) == 0 else None
-    panel.plot(time, path - path[0], color="#8e44ad" if antiparallel else "#7f8c8d", linewidth=1.6, label=label)
+    panel.plot(time, path - path[0], color="#0072B2" if antiparallel else "#7f8c8d", linewidth=1.6, label=label)
 panel.plot(time, 2 * SPEED * time, "--", color="0.2", linewidth=1.4, label="twice the speed of a head")
 panel.set(xlabel="time (s)", ylabel="apart (µm)", xlim=(0, time[-1]))
 panel.legend(frameon=False)
@@ -126,7 +126,7 @@ middle = frames[-1, 2:4].mean(axis=(0, 1))
 for own in frames[-1, 2:4]:
     colour = colours[int(own[-1, 0] > own[0, 0])]
     detail.plot(*own[:, :2].T, color=colour, linewidth=5, solid_capstyle="butt")
-detail.plot(*pulls.places[..., :2].T / 1000, ".-", color="#e67e22", linewidth=1.8, markersize=9, zorder=3)
+detail.plot(*pulls.places[..., :2].T / 1000, ".-", color="#B3261E", linewidth=1.8, markersize=9, zorder=3)
 detail.set(xlim=middle[0] + np.array([-0.45, 0.45]), ylim=middle[1] + np.array([-0.2, 0.2]), aspect="equal")
 detail.set(xlabel="x (µm)", ylabel="y (µm)")
 detail.set_title("Motors of the second pair from below", loc="left", fontsize=11)

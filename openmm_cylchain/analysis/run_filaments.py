@@ -34,6 +34,8 @@ class RunFilament:
         Nodes whose control points do not move.
     planar : bool
         Whether it stays in its plane z = const.
+    load : str
+        What pulls at it, such as "0.2 pN", where loads differ; else empty.
     """
 
     type: Any
@@ -44,6 +46,12 @@ class RunFilament:
     control_points: IntArray = field(default_factory=lambda: np.zeros(0, dtype=int))
     clamped_tangents: tuple[int, ...] = ()
     planar: bool = False
+    load: str = ""
+
+    @property
+    def label(self) -> str:
+        """The name of its type, and its load if loads differ."""
+        return f"{self.type.name}, {self.load}" if self.load else self.type.name
 
     @property
     def segments(self) -> int:
@@ -83,5 +91,5 @@ def described_filament(own: DescribedFilament) -> RunFilament:
     """A filament of a run, as its description has it."""
     nodes, control_points = (np.array(particles, dtype=int) for particles in (own.nodes, own.control_points))
     return RunFilament(
-        own.type, nodes, own.diameter, own.ring, own.clamped, control_points, own.clamped_tangents, own.planar
+        own.type, nodes, own.diameter, own.ring, own.clamped, control_points, own.clamped_tangents, own.planar, own.load
     )

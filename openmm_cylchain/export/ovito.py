@@ -37,7 +37,7 @@ def write_ovito(run: Run, path: str | Path) -> None:
         import gsd.hoomd
     except ImportError:
         raise InputError("Files for OVITO need the package gsd: install it by pip install gsd.") from None
-    names = list(dict.fromkeys(own.type.name for own in run.filaments))
+    names = list(dict.fromkeys(own.label for own in run.filaments))
     springs = spring_labels(run)
     hands = [f"{name} hand" for name in springs]
     particle_names = list(dict.fromkeys(own.name for own in run.particles))
@@ -46,9 +46,9 @@ def write_ovito(run: Run, path: str | Path) -> None:
     first_particle = len(names) + len(hands) + len(walls_there)
     center, cell = _cell(run)
     segments = _bonds(run)
-    kinds = np.concatenate([np.full(own.segments * own.pieces, names.index(own.type.name)) for own in run.filaments])
+    kinds = np.concatenate([np.full(own.segments * own.pieces, names.index(own.label)) for own in run.filaments])
     points = [_points(own) for own in run.filaments]
-    types = np.concatenate([np.full(own, names.index(each.type.name)) for own, each in zip(points, run.filaments)])
+    types = np.concatenate([np.full(own, names.index(each.label)) for own, each in zip(points, run.filaments)])
     diameters = np.concatenate([np.full(own, each.diameter) for own, each in zip(points, run.filaments)])
     temporary = path.with_name(f".{path.stem}.new.gsd")
     try:

@@ -107,7 +107,7 @@ def _agents(run, frame, types, center, outlines):
     data: list[float] = []
     for number, (own, points) in enumerate(zip(run.filaments, run.curves(frame))):
         points = unrolled(points) if own.ring else points
-        data += _agent(_FIBER, number, types["filament", own.type.name], 0.5 * own.diameter, points - center)
+        data += _agent(_FIBER, number, types["filament", own.label], 0.5 * own.diameter, points - center)
     number = len(run.filaments)
     for own in run.particles:
         for position in run.positions(frame)[own.indices] if len(own.indices) else ():

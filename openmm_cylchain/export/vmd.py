@@ -82,9 +82,9 @@ def write_vmd(run: Run, path: str | Path) -> None:
     widest = max(own.diameter for own in run.filaments)
     curves: dict[int, tuple[float, list[int]]] = {}
     for number, (kind, color) in enumerate(filament_colors(run).items()):
-        diameter = max(own.diameter for own in run.filaments if own.type.name == kind)
+        diameter = max(own.diameter for own in run.filaments if own.label == kind)
         radius = _ANGSTROM * 0.5 * max(diameter, 0.006 * extent * diameter / widest)
-        members = [i for i, own in enumerate(run.filaments) if own.type.name == kind]
+        members = [i for i, own in enumerate(run.filaments) if own.label == kind]
         beams = [i for i in members if run.filaments[i].pieces > 1]
         lines.append(_color(_FIRST_COLOR + number, color))
         if beams:
@@ -92,9 +92,15 @@ def write_vmd(run: Run, path: str | Path) -> None:
         if len(beams) == len(members):
             continue
         hidden = " ".join(str(node) for i in beams for own in _particles(run.filaments[i]) for node in own)
+        selection = (
+            f"resname {_word(run.filaments[members[0]].type.name)}{f' and not index {hidden}' if hidden else ''}"
+        )
+        if run.filaments[members[0]].load:
+            straight = (run.filaments[i].nodes for i in members if i not in beams)
+            selection = f"index {' '.join(str(node) for nodes in straight for node in nodes)}"
         lines += [
             f"mol representation Licorice {radius:.6g} 12 12",
-            f"mol selection {{resname {_word(kind)}{f' and not index {hidden}' if hidden else ''}}}",
+            f"mol selection {{{selection}}}",
             f"mol color ColorID {_FIRST_COLOR + number}",
             "mol material AOChalky",
             "mol addrep $molecule",

@@ -10,6 +10,16 @@ _MOTOR_COLORS = ("#B3261E", "#CC79A7", "#6A3D9A")
 _CROSSLINKER_COLORS = ("#F2B200", "#8C6D31", "#C9C400")
 
 
+def colors_of_filaments(count: int) -> list[str]:
+    """Colors of kinds of filaments, "#RRGGBB": those that are known best, or, of more kinds, of a scale of colors."""
+    if count <= len(FILAMENT_COLORS):
+        return list(FILAMENT_COLORS[:count])
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return [to_hex(colormaps["viridis"](0.9 * number / (count - 1))) for number in range(count)]
+
+
 def spring_colors(motors: Sequence[bool]) -> list[str]:
     """Colors of kinds of linkers that are motors or not: the first motor has one color in every run."""
     colors, counts = [], [0, 0]

@@ -36,6 +36,8 @@ class DescribedFilament:
         Nodes of beam elements whose control points do not move.
     planar : bool
         Whether it stays in its plane z = const.
+    load : str
+        What pulls at it, such as "0.2 pN", where loads differ; else empty.
     """
 
     type: ChainType
@@ -45,6 +47,7 @@ class DescribedFilament:
     control_points: tuple[int, ...] = ()
     clamped_tangents: tuple[int, ...] = ()
     planar: bool = False
+    load: str = ""
 
     @property
     def diameter(self) -> float:
@@ -158,6 +161,7 @@ class RunDescription:
                     "ring": own.ring,
                     "clamped": own.clamped,
                     "planar": own.planar,
+                    **({"load": own.load} if own.load else {}),
                     **(
                         {"control_points": own.control_points, "clamped_tangents": own.clamped_tangents}
                         if own.control_points
@@ -198,6 +202,7 @@ def read_run_description(path: Path) -> RunDescription:
                 tuple(own.get("control_points", ())),
                 tuple(own.get("clamped_tangents", ())),
                 own.get("planar", False),
+                own.get("load", ""),
             )
             for own in content["filaments"]
         )

@@ -81,8 +81,7 @@ def margins(scene: Scene, cameras: Callable[[Margins], Iterable[Camera]], size: 
         return bare
     corner = legend.get_window_extent(canvas.get_renderer())
     for camera in cameras(bare):
-        seen = camera.seen(scene.points)
-        across, up = (camera.distance * camera.scale * seen[:, :2] / -seen[:, 2:]).T
+        across, up = camera.places(scene.points).T
         if np.any((across < corner.x1 - 0.5 * camera.width) & (up > corner.y0 - 0.5 * height)):
             return Margins(min(math.ceil(corner.x1), width // 3), bare.right)
     return bare
@@ -99,7 +98,8 @@ def _draw_legend(figure, scene, text):
     handles = []
     for label, color, kind in scene.legend:
         if kind == "filament":
-            label = _FULL_NAMES.get(label, label)
+            name, comma, load = label.partition(", ")
+            label = _FULL_NAMES.get(name, name) + comma + load
             handles.append(Line2D([], [], color=color, linewidth=0.45 * text, solid_capstyle="round", label=label))
         elif kind == "particle":
             marker = dict(marker="o", markersize=0.8 * text, linestyle="none")

@@ -12,8 +12,11 @@ PROJECTIONS = ("perspective", "orthographic")
 # Of the distance to the eye in half diagonals of the scene. Rays of the second are parallel to a pixel.
 _DISTANCES = {"perspective": 3.5, "orthographic": 3000.0}
 _MARGIN = 0.06
-# Of the smallest extent over the middle one: what is flatter is seen from above.
+# Of the smallest extent over the middle one: what is flatter is seen from above. Of the second extent over the first:
+# what is thinner is seen from its side.
 _FLAT = 0.35
+_THIN = 0.35
+_OBLIQUE = np.array([-0.42, 0.83, -0.36])
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,11 @@ class Camera:
         """Places (..., 3) in nm from the eye: to the right, upwards and towards the viewer (negative)."""
         return (positions - self.center) @ self.axes.T - [0.0, 0.0, self.distance]
 
+    def places(self, positions: FloatArray) -> FloatArray:
+        """Places (..., 2) in the picture of positions (..., 3) in nm: pixels to the right and upwards of its middle."""
+        seen = self.seen(positions)
+        return self.distance * self.scale * seen[..., :2] / -seen[..., 2:]
+
     def enlarged(self, factor: int) -> "Camera":
         """The same view with more pixels."""
         return replace(self, scale=self.scale * factor, width=self.width * factor, height=self.height * factor)
@@ -68,7 +76,8 @@ def camera_on(
     size : (width, height) in pixels
     projection : {"perspective", "orthographic"}
     view : (3,) array, optional
-        Direction in which the camera looks. If not given, from above onto what is flat, and else obliquely.
+        Direction in which the camera looks. If not given, from above onto what is flat, from the side onto what is
+        thin, and else obliquely.
     turn : float
         Angle in degrees by which the camera is turned about the vertical.
     """
@@ -76,7 +85,7 @@ def camera_on(
         raise InputError(f"projection must be one of {', '.join(PROJECTIONS)}, but is {projection!r}.")
     lower, upper = points.min(axis=0), points.max(axis=0)
     extent = upper - lower
-    looking = _usual_view(extent) if view is None else np.asarray(view, dtype=float)
+    looking = _usual_view(points) if view is None else np.asarray(view, dtype=float)
     if looking.shape != (3,) or not np.all(np.isfinite(looking)) or not np.any(looking):
         raise InputError(f"view must be a direction, three numbers that are not all zero, but is {view!r}.")
     axes = _axes(looking, turn)
@@ -92,11 +101,18 @@ def camera_on(
     return Camera(center, axes, distance, scale, *size, (near, near + 2.0 * half_diagonal))
 
 
-def _usual_view(extent):
+def _usual_view(points):
+    extent = np.ptp(points, axis=0)
     flat = int(np.argmin(extent))
     if np.sort(extent)[0] < _FLAT * np.sort(extent)[1]:
         return -np.eye(3)[flat]
-    return np.array([-0.42, 0.83, -0.36])
+    _, principal = np.linalg.eigh(np.cov(points.T))
+    spread = np.ptp(points @ principal, axis=0)
+    if max(spread[:2]) >= _THIN * spread[2]:
+        return _OBLIQUE
+    longest = principal[:, 2]
+    aside = _OBLIQUE - (_OBLIQUE @ longest) * longest
+    return aside if np.linalg.norm(aside) > 0.2 else principal[:, 1]
 
 
 def _axes(looking, turn):

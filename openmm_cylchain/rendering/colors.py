@@ -1,7 +1,7 @@
 """Colors of what is in pictures of runs."""
 
 from ..analysis.runs import Run
-from ..output.colors import FILAMENT_COLORS, spring_colors
+from ..output.colors import colors_of_filaments, spring_colors
 
 # Of linkers where colors of filaments are numbers.
 _GREYS = ("#333333", "#8A8A8A", "#5E5E5E", "#B0B0B0")
@@ -14,9 +14,9 @@ PLUS_END_COLOR = "#101010"
 
 
 def filament_colors(run: Run) -> dict[str, str]:
-    """Colors "#RRGGBB" of the types of filaments of a run, by their names."""
-    names = dict.fromkeys(own.type.name for own in run.filaments)
-    return {name: FILAMENT_COLORS[number % len(FILAMENT_COLORS)] for number, name in enumerate(names)}
+    """Colors "#RRGGBB" of the filaments of a run, by their labels: types, and loads if these differ."""
+    labels = dict.fromkeys(own.label for own in run.filaments)
+    return dict(zip(labels, colors_of_filaments(len(labels))))
 
 
 def particle_colors(run: Run) -> dict[str, str]:

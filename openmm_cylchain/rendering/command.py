@@ -29,7 +29,9 @@ def add_command(commands):
     parser.add_argument(
         "--diameter", metavar="D", help='of all tubes, as in "20 nm", or true; visible ones if not given'
     )
-    parser.add_argument("--size", default="960x720", metavar="WxH", help="in pixels, 960x720 if not given")
+    parser.add_argument(
+        "--size", metavar="WxH", help="in pixels; if not given 960x720, or less where what is shown is thin"
+    )
     parser.add_argument("--projection", default="perspective", metavar="P", help="perspective (default), orthographic")
     parser.add_argument("--view", metavar="X,Y,Z", help="the direction in which the camera looks")
     parser.add_argument("--whole", action="store_true", help="let filaments leave the periodic box")
@@ -62,7 +64,7 @@ def _render(options):
         WATER if options.hide is None else tuple(filter(None, options.hide.split(","))),
     )
     direction = None if options.view is None else _numbers(options.view, ",", 3, "--view")
-    view = View(_size(options.size), options.projection, direction, options.turn)
+    view = View(None if options.size is None else _size(options.size), options.projection, direction, options.turn)
     run = load(options.run, options.incomplete)
     if options.film:
         progress = ProgressMessages(seconds_between_lines=_SECONDS_BETWEEN_LINES)

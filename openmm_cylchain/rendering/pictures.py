@@ -19,6 +19,8 @@ from .scene import Look, legend_of, make_scene
 from .shading import shaded_image
 
 PICTURES, FILMS = (".png",), (".gif", ".mp4", ".webm")
+_SIZE = (960, 720)
+_SHOWN = 0.75  # Of a picture that is made for what it shows: the rest is for what is written on it.
 _BACKGROUND = np.array([1.0, 1.0, 1.0])
 _CODECS = {
     ".mp4": ("libx264", ["-crf", "20", "-preset", "medium"]),
@@ -32,7 +34,8 @@ class View:
 
     Attributes
     ----------
-    size : (width, height) in pixels, even
+    size : (width, height) in pixels, even, or None
+        None is 960 by 720, or down to half as wide or high for what is thin.
     projection : {"perspective", "orthographic"}
     direction : (3,) sequence or None
         In which the camera looks; chosen if None.
@@ -40,12 +43,14 @@ class View:
         Degrees by which the camera turns about the vertical in a film.
     """
 
-    size: tuple[int, int] = (960, 720)
+    size: tuple[int, int] | None = None
     projection: str = "perspective"
     direction: tuple[float, float, float] | None = None
     turn: float = 0.0
 
     def __post_init__(self) -> None:
+        if self.size is None:
+            return
         if min(self.size) < 100 or max(self.size) > 8000 or any(edge % 2 for edge in self.size):
             raise InputError(f"size must be two even numbers of pixels from 100 to 8000, but is {self.size!r}.")
 
@@ -53,16 +58,15 @@ class View:
 def images(run: Run, frames: list[int], look: Look, view: View) -> Iterator[FloatArray]:
     """Pictures (height, width, 3) of frames, as whole numbers from 0 to 255, all with one framing."""
     scene = make_scene(run, look, frames)
-    width, height = view.size
     direction = None if view.direction is None else np.array(view.direction)
     turns = np.linspace(0.0, view.turn, len(frames)) if view.turn else np.zeros(1)
 
-    def cameras(free):
-        size = (width - free.left - free.right, height)
+    def cameras(size):
         return [camera_on(scene.points, size, view.projection, direction, turn) for turn in turns]
 
-    free = margins(scene, cameras, view.size)
-    own = cameras(free)
+    width, height = view.size or _fitting_size(scene.points, cameras(_SIZE))
+    free = margins(scene, lambda free: cameras((width - free.left - free.right, height)), (width, height))
+    own = cameras((width - free.left - free.right, height))
     # A picture of the start has the clock of the run.
     times = run.times[frames] if np.any(run.times[frames] > 0.0) else run.times
     for number, frame in enumerate(frames):
@@ -72,6 +76,12 @@ def images(run: Run, frames: list[int], look: Look, view: View) -> Iterator[Floa
         image = np.tile(_BACKGROUND, (height, width, 1))
         image[:, free.left : width - free.right] = shaded
         yield annotated(image, camera, scene, clock_text(float(run.times[frame]), times))
+
+
+def _fitting_size(points, cameras):
+    needed = 2.0 * np.max([np.abs(camera.places(points)).max(axis=0) for camera in cameras], axis=0) / _SHOWN
+    width, height = (2 * int(np.clip(own, usual / 2, usual) / 2) for own, usual in zip(needed, _SIZE))
+    return width, height
 
 
 def write_picture(run: Run, frame: int, path: str | Path, look: Look | None = None, view: View | None = None) -> None:

@@ -92,7 +92,7 @@ class Scene:
         In nm: what a camera has to see.
     legend : list of (label, color, kind) with the kind "filament", "particle" or "linker"
     scale : ColorScale or None
-        If filaments are not colored by their type.
+        If filaments are not colored by their type and load.
     """
 
     run: Run
@@ -112,7 +112,7 @@ class Scene:
         colors = filament_colors(self.run)
         for number, (own, points) in enumerate(zip(self.run.filaments, self.run.curves(frame))):
             ends = np.stack([points, np.roll(points, -1, axis=0)], axis=1)[: own.segments * own.pieces]
-            color = np.tile(_rgb(colors[own.type.name]), (len(ends), 1))
+            color = np.tile(_rgb(colors[own.label]), (len(ends), 1))
             if self.scale is not None and values is not None:
                 color = self.scale.colors(values[number])
             if has_polarity(self.run) and not own.ring:

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 from matplotlib.collections import LineCollection
+from matplotlib.transforms import ScaledTranslation
 
 from ..analysis.filament_shapes import filament_curves
 from ..mechanics.geometry import unrolled
@@ -72,7 +73,9 @@ class Conformations:
         name, length = time_unit(time)
         when = f"at {time / length:.4g} {name.replace('us', 'µs')}" if time > 0.0 else "at the start"
         axis.set_title(f"Filaments {when}, projected on the xy plane")
-        legend(axis, loc="upper left", bbox_to_anchor=(0.0, -0.01), borderaxespad=0.0)
+        # Below the scale bar and its length, which it would hide in a narrow frame.
+        below = axis.transAxes + ScaledTranslation(0.0, -2.4 * FONT_SIZE / 72.0, axis.figure.dpi_scale_trans)
+        legend(axis, loc="upper left", bbox_to_anchor=(0.0, -0.01), bbox_transform=below, borderaxespad=0.0)
         _draw_scale_bar(axis)
 
     def _label(self, group):
@@ -80,7 +83,9 @@ class Conformations:
         counts = sorted({one.segments for one in own})
         kind = group.type.segment_kind.name + "s" * (counts != [1])
         text = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-        return f"{sum(one.count for one in own)} × {group.type.name}, {text} {kind}"
+        label = f"{sum(one.count for one in own)} × {group.type.name}, {text} {kind}"
+        differ = len({one.load for one, *_ in self._groups}) > 1
+        return f"{label}, {group.load}" if differ and group.load else label
 
     def _draw_segments(self, axis, segments, colour, width, order, label):
         if self._box is not None and len(segments):

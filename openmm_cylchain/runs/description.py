@@ -1,5 +1,7 @@
 """The description of a run of a configuration, for ``analysis.load``."""
 
+from dataclasses import replace
+
 from ..systems.described_runs import describe_system
 from .initial_state import box_vectors
 
@@ -8,7 +10,7 @@ def describe(configuration, filaments, system, topology):
     """The RunDescription of a run of a configuration, in whose System particles are behind the filaments."""
     settings = configuration.simulation
     diameters = [own.diameter for own in configuration.particles for _ in range(own.count)]
-    return describe_system(
+    description = describe_system(
         filaments,
         system,
         title=configuration.title,
@@ -21,3 +23,13 @@ def describe(configuration, filaments, system, topology):
         topology=topology,
         diameters=dict(enumerate(diameters, system.getNumParticles() - len(diameters))),
     )
+    loads = _loads(configuration.filaments)
+    return replace(
+        description, filaments=tuple(replace(own, load=load) for own, load in zip(description.filaments, loads))
+    )
+
+
+def _loads(groups):
+    # Of each filament, as text; empty if they are all alike.
+    differ = len({group.load for group in groups}) > 1
+    return [group.load if differ else "" for group in groups for _ in range(group.count)]

@@ -20,7 +20,7 @@ from ..filaments.equilibrium import SegmentLengthDistribution
 from ..filaments.straight_segments import STRAIGHT_SEGMENTS
 from ..output.dcd_frames import DCDFrames
 from ..theory import beam_elements
-from ..units.quantities import PICONEWTON, thermal_energy
+from ..units.quantities import thermal_energy
 from .silence import silenced_c_library
 
 _STRETCHING, _STRETCHING_OF_ELEMENTS = "stretching energy per segment", "stretching energy per element"
@@ -110,8 +110,7 @@ def group_labels(configuration):
         for group in configuration.filaments
     ]
     if len(set(labels)) < len(labels) and all(group.tension for group in configuration.filaments):
-        tensions = [f"{group.tension[0] / PICONEWTON:.3g} pN" for group in configuration.filaments]
-        labels = [f"{label}, {tension}" for label, tension in zip(labels, tensions)]
+        labels = [f"{label}, {group.load}" for label, group in zip(labels, configuration.filaments)]
     if len(set(labels)) < len(labels):
         labels = [f"{label} (table {group.table})" for label, group in zip(labels, configuration.filaments)]
     return labels

@@ -13,7 +13,7 @@ from ..analysis.bending import joint_cosines, tangent_correlation
 from ..analysis.filament_shapes import segment_lengths
 from ..analysis.statistics import mean_with_error
 from ..filaments.straight_segments import STRAIGHT_SEGMENTS
-from ..output.colors import FILAMENT_COLORS, spring_colors
+from ..output.colors import FILAMENT_COLORS, colors_of_filaments, spring_colors
 from ..output.files import write_atomically
 from ..output.linker_records import LINKER_RECORD
 from ..output.read_tables import read_reports, read_table
@@ -58,18 +58,22 @@ def _draw(configuration, directory, trajectory, network):
     if configuration.title:
         figure.suptitle(configuration.title, fontsize=FONT_SIZE + 3)
     groups = [
-        (group, list(members), label, _COLOURS[number % len(_COLOURS)])
-        for number, (group, members, label) in enumerate(
-            zip(configuration.filaments, group_members(configuration), group_labels(configuration))
+        (group, list(members), label, colour)
+        for group, members, label, colour in zip(
+            configuration.filaments,
+            group_members(configuration),
+            group_labels(configuration),
+            colors_of_filaments(len(configuration.filaments)),
         )
     ]
+    of_tables = colors_of_filaments(groups[-1][0].table)
     temperature = configuration.solvent.temperature
     energies = read_table(directory.energies)
     labels = linker_labels(configuration)
     colours = spring_colors([own.kind.is_motor for own in configuration.linkers])
     conformations = Conformations(
         configuration,
-        [(group, members, _COLOURS[(group.table - 1) % len(_COLOURS)]) for group, members, *_ in groups],
+        [(group, members, of_tables[group.table - 1]) for group, members, *_ in groups],
         trajectory,
         read_records(directory.linker_places) if configuration.linkers else np.zeros(0, LINKER_RECORD),
         list(zip(labels, colours)),

@@ -1,5 +1,6 @@
 """Pictures and films of runs: what is in them, and what is refused."""
 
+import json
 import shutil
 import sys
 
@@ -12,12 +13,13 @@ from PIL import Image
 from openmm_cylchain import InputError, Plane, Slab, Sphere, analysis
 from openmm_cylchain.cli import main
 from openmm_cylchain.couplings.shapes import Box, Cylinder, Ellipsoid
+from openmm_cylchain.output.colors import colors_of_filaments
 from openmm_cylchain.rendering.annotations import Margins, clock_text, margins, scale_bar_length
 from openmm_cylchain.rendering.camera import camera_on
 from openmm_cylchain.rendering.colors import PLUS_END_COLOR, filament_colors, linker_colors
 from openmm_cylchain.rendering.pictures import View, images, write_film
 from openmm_cylchain.rendering.scene import COLORINGS, Look, has_polarity, make_scene
-from support.small_runs import AMONG_SPHERES, NETWORK, TWO_TYPES, simulated
+from support.small_runs import AMONG_SPHERES, NETWORK, TWO_LOADS, TWO_TYPES, simulated
 
 SIZE = ["--size", "160x120"]
 SMALL = View(size=(160, 120))
@@ -60,6 +62,34 @@ def test_a_picture_of_a_network(network, tmp_path):
 def test_types_have_colors(two_types, tmp_path):
     image = picture(two_types, tmp_path, "--size", "320x240", "--diameter", "50 nm")
     assert hue_of(image, BLUE) > 100 and hue_of(image, GREEN) > 100
+
+
+def test_loads_have_colors(tmp_path):
+    path = simulated(tmp_path, TWO_LOADS)
+    run = analysis.load(path)
+    assert [own.load for own in run.filaments] == ["0.2 pN", "0.2 pN", "10 pN"]
+    name = run.filaments[0].type.name
+    assert list(filament_colors(run)) == [f"{name}, 0.2 pN", f"{name}, 10 pN"]
+    image = picture(path, tmp_path, "--size", "320x240")
+    assert hue_of(image, BLUE) > 100 and hue_of(image, GREEN) > 100
+    # In other programs, too.
+    selections = [line for line in exported(path, tmp_path, "vmd").splitlines() if "mol selection" in line]
+    nodes = [" ".join(map(str, range(*ends))) for ends in ((0, 12), (12, 18))]
+    assert selections == [f"mol selection {{index {own}}}" for own in nodes]
+    content = json.loads(exported(path, tmp_path, "simularium"))
+    names = [own["name"] for own in content["trajectoryInfo"]["typeMapping"].values()]
+    assert names == list(filament_colors(run))
+
+
+def exported(run, tmp_path, kind):
+    path = tmp_path / ("file.tcl" if kind == "vmd" else "file.simularium")
+    assert main(["export", str(run), "--format", kind, "--output", str(path)]) == 0
+    return path.read_text()
+
+
+@pytest.mark.parametrize("count", [1, 4, 5, 30])
+def test_no_two_kinds_of_filaments_have_one_color(count):
+    assert len(set(colors_of_filaments(count))) == count
 
 
 def test_frames_differ_and_repeat(two_types, tmp_path):
@@ -137,6 +167,45 @@ def test_films_show_all_filaments(two_types, direction):
     seen = camera.seen(np.concatenate([nodes for frame in frames for nodes in run.nodes(frame)]))
     places = camera.distance * camera.scale * seen[:, :2] / -seen[:, 2:]
     assert np.all(np.abs(places) < [160, 120])
+
+
+@pytest.mark.parametrize(
+    "axis", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0), (-0.4, 0.8, -0.4)]
+)
+def test_what_is_thin_is_seen_from_its_side(axis):
+    axis = np.array(axis) / np.linalg.norm(axis)
+    across = np.linalg.svd(axis[None])[2][1:]
+    turn = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    circle = np.stack([np.cos(turn), np.sin(turn)], axis=1) @ across
+    points = np.concatenate([100.0 * height * axis + 5.0 * circle for height in np.linspace(-1.0, 1.0, 9)])
+    camera = camera_on(points, (960, 720))
+    assert abs(camera.axes[2] @ axis) < 0.01
+    # It fills the picture in one direction.
+    assert np.max(np.abs(camera.places(points)).max(axis=0) / [480, 360]) == pytest.approx(0.88)
+
+
+def test_pictures_of_thin_things_are_thin(tmp_path):
+    """They are no larger than what they show needs, unless a size is given."""
+    text = """[solvent]
+        temperature = "310 K"
+        viscosity = "1 mPa*s"
+        [[filament]]
+        type = "F_ACTIN"
+        segments = 5
+        start = "straight"
+        direction = [1, 0, 0]
+        [simulation]
+        time_step = "1 us"
+        duration = "10 us"
+        report_interval = "10 us"
+        seed = 1
+    """
+    run = simulated(tmp_path, text)
+    image = picture(run, tmp_path)
+    assert image.shape == (360, 960, 3)
+    # From its first to its last column.
+    assert np.ptp(np.flatnonzero(np.any(np.ptp(image[100:260], axis=2) > 60, axis=0))) > 0.8 * 960
+    assert picture(run, tmp_path, *SIZE).shape == (120, 160, 3)
 
 
 @pytest.mark.parametrize("color", COLORINGS)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from openmm_cylchain import analysis
 from openmm_cylchain.output.colors import spring_colors
 from openmm_cylchain.rendering.colors import filament_colors, linker_colors
-from support.small_runs import NETWORK, simulated
+from support.small_runs import NETWORK, TWO_LOADS, simulated
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +46,15 @@ def test_a_network_is_shown_at_its_start_and_at_its_end(drawn):
     assert [label.removeprefix("share of filaments in the ") for label in labels_of(axes[2])] == shares
     order, _, joined = (line.get_ydata() for line in axes[2].lines)
     assert len(order) == len(run) and 0.0 <= joined.min() and joined.max() <= 1.0
+
+
+def test_legends_do_not_hide_scale_bars(drawn):
+    axes, _ = drawn
+    for axis in axes[:2]:
+        (length,) = axis.texts
+        bar = axis.lines[-1]
+        for own in (length, bar):
+            assert not axis.get_legend().get_window_extent().overlaps(own.get_window_extent())
 
 
 def test_filaments_and_linkers_are_within_the_box(drawn):
@@ -114,3 +123,12 @@ def rgb_to_luminance(name):
     channels = np.array(to_rgb(name))
     linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
     return linear @ [0.2126, 0.7152, 0.0722]
+
+
+def test_loads_are_named(tmp_path, monkeypatch):
+    figures, savefig = [], Figure.savefig
+    monkeypatch.setattr(
+        Figure, "savefig", lambda own, *rest, **options: (figures.append(own), savefig(own, *rest, **options))
+    )
+    simulated(tmp_path, TWO_LOADS)
+    assert labels_of(figures[0].axes[0]) == ["2 × DNA, 5 segments, 0.2 pN", "1 × DNA, 5 segments, 10 pN"]

@@ -81,6 +81,30 @@ report_interval = "50 us"
 seed = 5
 """
 
+TWO_LOADS = """
+[solvent]
+temperature = "298.15 K"
+viscosity = "1 mPa*s"
+[[filament]]
+type = "DSDNA"
+segments = 5
+count = 2
+[[filament]]
+type = "DSDNA"
+segments = 5
+[[pull]]
+table = 1
+tension = "0.2 pN"
+[[pull]]
+table = 2
+tension = "10 pN"
+[simulation]
+time_step = "1 ns"
+duration = "20 ns"
+report_interval = "1 ns"
+seed = 5
+"""
+
 
 def simulated(folder, text):
     """The directory of a run of a configuration."""
