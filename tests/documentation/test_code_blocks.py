@@ -79,7 +79,7 @@ GIVEN = {
     ("docs/pictures.md", "from openmm_cylchain import analysis"): RUN.replace("DIRECTORY", "motor_network"),
     ("docs/scans.md", "from concurrent.futures"): SCAN,
     ("docs/time_step.md", "step = filaments"): BUILT,
-    ("docs/walls.md", "system.addForce"): BUILT,
+    ("docs/walls.md", "from openmm import unit"): BUILT,
     ("docs/walls.md", "simulation.step"): """
 integrator = filaments.create_integrator(system, 1 * unit.microsecond)
 simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatformByName("CPU"))
@@ -189,6 +189,7 @@ def test_commands_exist_with_these_options(capsys):
             known = {
                 "python3",
                 "python",
+                "source",
                 "pip",
                 "pytest",
                 "apt",
