@@ -123,7 +123,7 @@ def test_python_runs(page):
 
 def _assert_that_all_move():
     """Nodes and what was there, and nothing is thrown anywhere."""
-    for directory, least, most in (("protein", 1e-4, 1.0), ("own_run", 0.01, 60.0)):
+    for directory, least, most in (("protein", 1e-6, 1.0), ("own_run", 0.01, 60.0)):
         run = analysis.load(directory)
         moved = np.linalg.norm(run.positions(-1) - run.positions(0), axis=1)
         assert len(run) > 3 and moved.min() > least and moved.max() < most, (directory, moved.min(), moved.max())
