@@ -262,7 +262,8 @@ def _step_of_system(configuration):
     for name, allowed in recommended.allowed.items():
         if math.isfinite(allowed):
             print(f"  {format_time(allowed, 4):>12}  allowed by {named_bound(configuration, name)}")
-    print(f"  {'recommended':<36} {format_time(recommended.step, 4):>12}  ({recommended.reason})")
+    reason = named_bound(configuration, recommended.reason)
+    print(f"  {'recommended':<36} {format_time(recommended.step, 4):>12}  ({reason})")
     print(f"  {'in this configuration':<36} {format_time(settings.time_step, 4):>12}")
 
 

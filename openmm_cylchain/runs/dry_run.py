@@ -37,19 +37,24 @@ def dry_run(configuration):
 def _what_is_built(configuration, built):
     filaments, system = built.filaments, built.system
     segments = sum(filament.segments for filament in filaments)
-    yield f"  {len(filaments)} filaments, {segments} segments, {system.getNumParticles()} particles"
+    counts = ((len(filaments), "filament"), (segments, "segment"), (system.getNumParticles(), "particle"))
+    yield f"  {', '.join(_counted(*one) for one in counts)}"
     yield from (f"    {label}" for label in group_labels(configuration))
     yield from (f"    {own.count} × {own.name}, {own.diameter:g} nm" for own in configuration.particles)
     for label, own in zip(linker_labels(configuration), configuration.linkers):
         count = len(own.anchors) if own.anchors is not None else own.count
-        yield f"    {'linkers at a concentration' if count is None else f'{count} linkers'}: {label}"
+        yield f"    {'linkers at a concentration' if count is None else _counted(count, 'linker')}: {label}"
     if built.links:
-        yield f"    {built.links} links"
+        yield f"    {_counted(built.links, 'link')}"
     if configuration.joints:
-        yield f"    {len(configuration.joints)} joints"
+        yield f"    {_counted(len(configuration.joints), 'joint')}"
     if configuration.box is not None:
         yield f"  box of {' × '.join(f'{edge:g}' for edge in configuration.box)} nm"
     yield f"  forces: {', '.join(force.getName() for force in system.getForces())}"
+
+
+def _counted(count, what):
+    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _binding(configuration, recommended):

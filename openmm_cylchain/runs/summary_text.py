@@ -119,8 +119,12 @@ def _linker_table(linkers):
     rows = [("linkers", "unbound", "one hand", "both hands", "mean tension (pN)", "largest (pN)")]
     for own in linkers:
         states = [
-            format_with_error(getattr(own, state), getattr(own, f"{state}_error"))
-            for state in ("unbound", "one_hand_bound", "both_hands_bound")
+            "-" if value is None else format_with_error(value, error)
+            for value, error in (
+                (own.unbound, own.unbound_error),
+                (own.one_hand_bound, own.one_hand_bound_error),
+                (own.both_hands_bound, own.both_hands_bound_error),
+            )
         ]
         tensions = ["-" if force is None else f"{force:.3g}" for force in (own.mean_tension, own.largest_tension)]
         rows.append((own.name, *states, *tensions))

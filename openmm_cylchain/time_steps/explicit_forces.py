@@ -16,6 +16,7 @@ import scipy
 
 from ..errors import TimeStepWarning
 from ..filaments.collection import FilamentCollection
+from ..units.text import format_time
 from ..units.types import Numbers
 from .coupled_forces import CoupledForces
 from .schemes import EXPLICIT_SCHEMES, IMPLICIT_SCHEMES
@@ -116,8 +117,8 @@ class ExplicitForces:
             excess = 1.0 / (1.0 - 0.5 * largest) - 1.0 if largest < UNSTABLE else math.inf
             what = f"fluctuations may be {100.0 * excess:.3g} % too large" if excess < 10.0 else "it is thrown apart"
             warnings.warn(
-                f"A time step of {step:.4g} ps is too long for forces that are explicit, most of all {name}: {what}. "
-                f"Recommended for these forces: {self.allowed_step(accurate, ACCURATE):.4g} ps.",
+                f"A time step of {format_time(step, 4)} is too long for forces that are explicit, most of all {name}: "
+                f"{what}. Recommended for these forces: {format_time(self.allowed_step(accurate, ACCURATE), 4)}.",
                 TimeStepWarning,
                 stacklevel=4,
             )

@@ -22,6 +22,7 @@ import scipy
 from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..errors import ContactWarning
 from ..filaments.collection import FilamentCollection
+from ..units.text import format_time
 from ..units.types import Numbers
 from .coupled_forces import CoupledForces
 from .other_particles import describe_other_particles
@@ -74,19 +75,20 @@ def warn_of_hard_contacts(
         if contacts is None or not coupled_forces.includes(index):
             continue
         longest = longest_resolving_step(filaments, system, contacts, particle_friction)
-        label = f"{force.getName()} (force {index}): a time step of {step:.4g} ps"
+        label = f"{force.getName()} (force {index}): a time step of {format_time(step, 4)}"
         if step > longest:
             warnings.warn(
                 f"{label} takes contacts, and walls beside them, for hard ones: filaments keep their distances, but "
                 "energies and forces of contacts and walls are too small, by up to a half. Steps of up to "
-                f"{longest:.3g} ps resolve them.",
+                f"{format_time(longest, 3)} resolve them.",
                 ContactWarning,
                 stacklevel=4,
             )
         elif step > SHARE_FOR_BUNDLES * longest:
             warnings.warn(
                 f"{label} gives contacts of filaments that lie along each other, as in a bundle, up to a sixth too "
-                f"much energy: 6 % at {SHARE_FOR_BUNDLES * longest:.3g} ps, nothing at a tenth of {longest:.3g} ps.",
+                f"much energy: 6 % at {format_time(SHARE_FOR_BUNDLES * longest, 3)}, nothing at a tenth of "
+                f"{format_time(longest, 3)}.",
                 ContactWarning,
                 stacklevel=4,
             )

@@ -10,6 +10,7 @@ from ..filaments.chain_type import ChainType
 from ..filaments.collection import FilamentCollection
 from ..mechanics.flow import Flow
 from ..mechanics.friction import SegmentFriction
+from ..units.text import format_time
 from ..units.types import Numbers, Scalar
 from .buckling_step import steps_of_buckling
 from .coupled_forces import CoupledForces
@@ -79,8 +80,8 @@ def warn_if_unstable(
             unstable = True
             recommended = recommended_time_step(filament_type, viscosity, temperature, scheme, segments)
             warnings.warn(
-                f"A time step of {step:.4g} ps exceeds the {name} bound of {bound:.4g} ps of filament type "
-                f"{filament_type.name!r}: the simulation will blow up. Recommended: {recommended}.",
+                f"A time step of {format_time(step, 4)} exceeds the {name} bound of {format_time(bound, 4)} of "
+                f"filament type {filament_type.name!r}: the simulation will blow up. Recommended: {recommended}.",
                 TimeStepWarning,
                 stacklevel=4,
             )
@@ -108,8 +109,8 @@ def warn_if_far_above(
     )
     if step > _FAR_ABOVE * recommended.step and IDLE not in recommended.bounds:
         warnings.warn(
-            f"A time step of {step:.4g} ps is {step / recommended.step:.3g} times as long as the recommended one of "
-            f"filament type {filament_type.name!r} with {segments} segments. Recommended: {recommended}.",
+            f"A time step of {format_time(step, 4)} is {step / recommended.step:.3g} times as long as the recommended "
+            f"one of filament type {filament_type.name!r} with {segments} segments. Recommended: {recommended}.",
             TimeStepWarning,
             stacklevel=4,
         )
@@ -125,9 +126,10 @@ def warn_if_fene_is_wrong(
     resolved, drawn = fene_steps(filament_type, friction, temperature)
     if 1.01 * resolved < step < 0.99 * drawn:
         warnings.warn(
-            f"A time step of {step:.4g} ps neither resolves the lengths of filament type {filament_type.name!r} within "
-            "their FENE range nor is long enough to draw them anew: their energies are too high. Use a step of at most "
-            f"{resolved:.4g} ps, or of at least {drawn:.4g} ps if the rest allows it.",
+            f"A time step of {format_time(step, 4)} neither resolves the lengths of filament type "
+            f"{filament_type.name!r} within their FENE range nor is long enough to draw them anew: their energies are "
+            f"too high. Use a step of at most {format_time(resolved, 4)}, or of at least {format_time(drawn, 4)} if "
+            "the rest allows it.",
             TimeStepWarning,
             stacklevel=4,
         )
@@ -139,9 +141,9 @@ def warn_if_strained(step: Scalar | TimeStep, flow: Flow) -> None:
     strain = step * strain_rate(flow)
     if strain > _LARGEST_STRAIN:
         warnings.warn(
-            f"In a time step of {step:.4g} ps the flow strains the solvent by {strain:.3g}: it is not resolved. Use a "
-            f"step of at most {_LARGEST_STRAIN * step / strain:.4g} ps, or better "
-            f"{RECOMMENDED_STRAIN * step / strain:.4g} ps.",
+            f"In a time step of {format_time(step, 4)} the flow strains the solvent by {strain:.3g}: it is not "
+            f"resolved. Use a step of at most {format_time(_LARGEST_STRAIN * step / strain, 4)}, or better "
+            f"{format_time(RECOMMENDED_STRAIN * step / strain, 4)}.",
             TimeStepWarning,
             stacklevel=4,
         )
@@ -164,9 +166,9 @@ def warn_if_driven_far(
     advance = step * abs(propulsion) / friction.parallel / filament_type.segment_length
     if advance > _LARGEST_ADVANCE:
         warnings.warn(
-            f"In a time step of {step:.4g} ps a propelled segment of filament type {filament_type.name!r} advances by "
-            f"{advance:.3g} of its length: it is not resolved. Use a step of at most "
-            f"{_LARGEST_ADVANCE * step / advance:.4g} ps.",
+            f"In a time step of {format_time(step, 4)} a propelled segment of filament type {filament_type.name!r} "
+            f"advances by {advance:.3g} of its length: it is not resolved. Use a step of at most "
+            f"{format_time(_LARGEST_ADVANCE * step / advance, 4)}.",
             TimeStepWarning,
             stacklevel=4,
         )
@@ -178,8 +180,8 @@ def warn_if_buckling_is_not_resolved(recommended: Sequence[TimeStep], step: Scal
     for one in recommended:
         if step > _FAR_ABOVE * one.step:
             warnings.warn(
-                f"A time step of {step:.4g} ps does not resolve how a filament buckles, which is too slow in it. "
-                f"Recommended: {one}.",
+                f"A time step of {format_time(step, 4)} does not resolve how a filament buckles, which is too slow in "
+                f"it. Recommended: {one}.",
                 TimeStepWarning,
                 stacklevel=4,
             )
@@ -191,8 +193,8 @@ def warn_if_hands_are_not_resolved(system: openmm.System, step: Scalar | TimeSte
     for what, allowed in steps_of_hands(system).items():
         if step > _FAR_ABOVE * allowed:
             warnings.warn(
-                f"A time step of {step:.4g} ps is {step / allowed:.3g} times as long as the recommended one of "
-                f"linkers: {what} in {allowed:.4g} ps.",
+                f"A time step of {format_time(step, 4)} is {step / allowed:.3g} times as long as the recommended one "
+                f"of linkers: {what} in {format_time(allowed, 4)}.",
                 TimeStepWarning,
                 stacklevel=4,
             )

@@ -74,7 +74,7 @@ class TimeStep:
 
     def __str__(self) -> str:
         unknown = f"; not known: {', '.join(self.unknown_forces)}" if self.unknown_forces else ""
-        return f"{self.step:.4g} ps: {self.reason}{unknown}"
+        return f"{format_time(self.step, 4)}: {self.reason}{unknown}"
 
 
 def as_step(step: Scalar | TimeStep, name: str = "step_size") -> float:

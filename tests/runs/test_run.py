@@ -517,7 +517,7 @@ def test_blow_up_is_reported_and_leaves_no_broken_frame(tmp_path, capsys):
     output = tmp_path / "out"
     assert main(["run", config, "--output", str(output)]) == 1
     errors = capsys.readouterr().err
-    assert "warning: A time step of 4e+05 ps exceeds the stretching bound" in errors
+    assert "warning: A time step of 400 ns exceeds the stretching bound" in errors
     assert re.search(r"error: Filament \d \(ACT\) has blown up at segment \d in step \d+", errors)
     assert "another directory" in errors and "Traceback" not in errors
     trajectory = mdtraj.load_dcd(str(output / "trajectory.dcd"), top=str(output / "topology.cif"))

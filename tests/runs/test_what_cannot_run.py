@@ -294,7 +294,9 @@ def test_messages_name_their_table_once(tmp_path, capsys):
 def test_every_warning_of_the_package_is_told_once(tmp_path, capsys):
     far = linkers('binding_rate = "1 1/s", unbinding_rate = "1 1/s"', "count = 1", reach=100)
     assert main(["run", written(tmp_path, BOX, far), "--dry-run"]) == 0
-    said = capsys.readouterr().err
+    told = capsys.readouterr()
+    assert "\n    1 linker: m\n" in told.out
+    said = told.err
     assert said.count("warning: Linkers 'm': a reach of 100 nm is far beyond") == 1 and "LinkerWarning" not in said
 
 

@@ -132,7 +132,7 @@ LINKERS = TableKind(
         Key("anchors", _Anchors(), None, "Points to which they are tied, one each, in place of their first hands."),
         Key("bound", Whole(0, 10**7, "100"), 0, "How many begin with one hand bound, at random or near anchors."),
     ),
-    "Crosslinkers or motors that bind to filaments, walk along them and unbind; `docs/kinetics.md` has their laws.",
+    "Crosslinkers or motors that bind to filaments, walk along them and unbind; the page on linkers has their laws.",
     repeated=True,
 )
 
