@@ -164,6 +164,8 @@ class Joints:
     def _measure(self, context):
         if self._curves is None:
             raise InputError("These joints are not in a System yet: call add_to before Contexts are created.")
+        if not isinstance(context, openmm.Context):
+            raise InputError(f"context must be an openmm.Context, but is {shown(context)}.")
         table = self._links.table(context)
         state = context.getState(positions=True)
         positions = state.getPositions(asNumpy=True)._value

@@ -69,6 +69,8 @@ def change_constant_force(force: openmm.CustomExternalForce, context: openmm.Con
         of each filament in turn; ``tension_forces`` has their forces.
     """
     _refuse_unless_constant(force)
+    if not isinstance(context, openmm.Context) or not _has_force(context.getSystem(), force):
+        raise InputError(f"context must be one of the System that has the force, but is {shown(context)}.")
     for index, components in enumerate(_as_forces(forces, force.getNumParticles())):
         particle, _ = force.getParticleParameters(index)
         force.setParticleParameters(index, particle, components)
@@ -81,6 +83,10 @@ def is_constant_force(force: openmm.Force) -> bool:
         return False
     names = (force.getPerParticleParameterName(i) for i in range(force.getNumPerParticleParameters()))
     return tuple(names) == _COMPONENTS
+
+
+def _has_force(system, force):
+    return any(int(one.this) == int(force.this) for one in system.getForces())
 
 
 def _refuse_unless_constant(force):

@@ -118,9 +118,10 @@ def place_linkers(
 def _add_hand(force, hand, filaments, name):
     chains = [i for i, filament in enumerate(filaments) if hand.binds(filament.type)]
     if not chains:
+        types = sorted({filament.type.name for filament in filaments})
         raise InputError(
             f"Linkers {name!r}: a hand binds to filaments of the type {' or '.join(hand.binds_to)}, of which there are "
-            "none: change its binds_to."
+            f"none among {', '.join(types)}: change its binds_to."
         )
     longest = max(contour_of(filament)[-1] for filament in filaments if hand.binds(filament.type))
     if hand.site_spacing is not None and hand.site_spacing > longest * (1.0 + 1e-9):
