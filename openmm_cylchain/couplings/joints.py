@@ -9,7 +9,7 @@ import openmm
 
 from ..errors import InputError
 from ..filaments.segment_place import SegmentPlace
-from ..units.quantities import ANGLE, ENERGY, in_units_of, positive, shown, unit_vector
+from ..units.quantities import ANGLE, ENERGY, in_units_of, positive, require_kind, shown, unit_vector
 from ..units.types import FloatArray, Indices, IntArray, Scalar, Vector
 from .beam_curves import BeamCurves
 from .crosslink_tables import CrosslinkTable
@@ -77,6 +77,7 @@ class Joints:
         InputError
             If these joints are in a System already, or one is not on a filament of beam elements of it.
         """
+        require_kind(system, openmm.System, "system")
         curves = BeamCurves.of_system(system) if is_of_compiled_engine(system) else None
         if curves is None:
             raise InputError("Joints are between filaments of beam elements, of which this System has none.")

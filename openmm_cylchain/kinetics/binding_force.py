@@ -12,7 +12,7 @@ from ..engine_choice import load_plugin
 from ..errors import InputError
 from ..filaments.filament import Filament
 from ..mechanics.geometry import to_nearest_images
-from ..units.quantities import thermal_energy
+from ..units.quantities import require_kind, thermal_energy
 from ..units.types import FloatArray, IntArray
 from .first_places import FirstPlaces, contour_of
 from .hand import Hand
@@ -182,6 +182,7 @@ def table_of(force: Any, context: openmm.Context) -> LinkerTable:
 
 def set_table(force: Any, context: openmm.Context, table: LinkerTable) -> None:
     """Give a Context the linkers of a table; InputError if they do not fit types, anchors or filaments."""
+    require_kind(table, LinkerTable, "table")
     columns = [np.asarray(column).ravel().tolist() for column in (
         table.numbers, table.types, table.anchors, table.filaments, table.arc_lengths
     )]  # fmt: skip
