@@ -34,7 +34,7 @@ def choose_engine(name: str | None = None) -> str:
 
     An EngineWarning says why the compiled engine is left out, where it is installed.
     """
-    if name is not None and name not in ENGINES:
+    if name is not None and not (isinstance(name, str) and name in ENGINES):
         raise InputError(f"engine must be one of {', '.join(ENGINES)}, but is {name!r}.")
     reasons = available_engines()
     if name is None:

@@ -9,17 +9,21 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..units.quantities import TEMPERATURE, positive, shown, whole_number
+from ..units.quantities import TEMPERATURE, positive, shown, true_or_false, whole_number
 from ..units.types import FloatArray, Indices, Scalar
 from .bead_spring_type import BeadSpringType
 from .modes import mode_shapes
 from .transfer_operator import TransferOperator, transfer_operator
 
+_MOST_BONDS = 10**7
+
 
 def _operator(bead_type, bonds, temperature, planar):
     if not isinstance(bead_type, BeadSpringType):
         raise InputError(f"This is for a BeadSpringType, such as DSDNA_BASE_PAIRS, but not for {shown(bead_type)}.")
-    bonds = whole_number(bonds, 1, "bonds")
+    bonds, planar = whole_number(bonds, 1, "bonds"), true_or_false(planar, "planar")
+    if bonds > _MOST_BONDS:
+        raise InputError(f"bonds must be at most {_MOST_BONDS:.0e}, but is {bonds}.")
     reduced = bead_type.reduced_temperature(positive(temperature, TEMPERATURE, "temperature"))
     return transfer_operator(bead_type.nu, reduced, bonds, 2 if planar else 3)
 

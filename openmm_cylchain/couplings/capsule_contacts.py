@@ -12,8 +12,8 @@ import openmm
 from ..engine_choice import available_engines, choose_engine
 from ..errors import ContactWarning, InputError
 from ..filaments.chain_type import ChainType
-from ..filaments.collection import FilamentCollection
-from ..units.quantities import LENGTH, STIFFNESS, positive, thermal_energy, whole_number
+from ..filaments.collection import FilamentCollection, require_filaments
+from ..units.quantities import LENGTH, STIFFNESS, positive, thermal_energy, true_or_false, whole_number
 from ..units.types import Indices, Numbers, Scalar
 from .contacts import SAFE_BARRIER, filament_diameters, outside_particles, particle_diameters
 from .periodicity import default_box, is_periodic
@@ -123,6 +123,7 @@ def capsule_contact_force(
     choose_engine("compiled")
     from .. import plugin
 
+    require_filaments(filaments)
     diameters = filament_diameters(diameter, len(filaments))
     spheres = outside_particles(filaments, system, particles)
     sphere_diameters = particle_diameters(particles, particle_diameter)
@@ -136,7 +137,7 @@ def capsule_contact_force(
     stiffness = positive(stiffness, STIFFNESS, "stiffness")
     if excluded_neighbors is not None:
         excluded_neighbors = whole_number(excluded_neighbors, 0, "excluded_neighbors")
-    periodic = is_periodic(system) if periodic is None else bool(periodic)
+    periodic = is_periodic(system) if periodic is None else true_or_false(periodic, "periodic")
     if periodic:
         _check_box(system, filaments, max([*diameters, *sphere_diameters]))
     _warn_of_barrier(filaments, diameters, stiffness)

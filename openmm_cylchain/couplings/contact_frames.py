@@ -12,6 +12,7 @@ import openmm
 from ..engine_choice import choose_engine
 from ..errors import InputError
 from ..output.run_description import DescribedContacts
+from ..units.quantities import require_kind
 from ..units.types import FloatArray, IntArray
 from .capsule_contacts import as_capsule_contact_force
 
@@ -74,6 +75,7 @@ def find_contacts(force: openmm.Force, context: openmm.Context) -> ContactFrame:
     own = as_capsule_contact_force(force)
     if own is None:
         raise InputError(f"force must be one of capsule_contact_force, but is {type(force).__name__}.")
+    require_kind(context, openmm.Context, "context")
     try:
         ends, fractions, gaps, forces, directions = own.getContacts(context)
     except openmm.OpenMMException as error:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Collection
 
 import numpy as np
 import numpy.typing as npt
@@ -17,16 +16,16 @@ import openmm
 
 from ..errors import ContactWarning, InputError
 from ..filaments.attachments import SAME_PLACE
-from ..filaments.collection import FilamentCollection
+from ..filaments.collection import FilamentCollection, require_filaments
 from ..units.quantities import (
     LENGTH,
     STIFFNESS,
     in_units_of,
     non_negative,
     positive,
-    shown,
+    require_kind,
     thermal_energy,
-    whole_number,
+    whole_numbers,
 )
 from ..units.types import FloatArray, Indices, IntArray, Numbers, Scalar
 from .periodicity import default_box, is_periodic
@@ -46,6 +45,9 @@ _WITH_EXCLUSIONS = (openmm.NonbondedForce, openmm.CustomNonbondedForce, openmm.C
 # OpenMM's CPU platform looks for neighbours within 5/4 of the cutoff, and again when particles have moved by 1/8 of it.
 # Looking is what costs most, so three diameters take a third of the time that one takes.
 _CUTOFF_DIAMETERS = 3.0
+
+_MOST_BEADS = 100
+"""Of a filament within the diameter of one."""
 
 
 def excluded_pairs(filaments: FilamentCollection, distance: Scalar = 0.0) -> IntArray:
@@ -67,6 +69,7 @@ def excluded_pairs(filaments: FilamentCollection, distance: Scalar = 0.0) -> Int
     (pairs, 2) int array
         Particle indices, the lower first.
     """
+    require_filaments(filaments)
     distance = non_negative(distance, LENGTH, "distance")
     beads_and_points: list[list[tuple[int, int, float]]] = [[] for _ in range(len(filaments))]
     for particle, attachment in zip(filaments.attachment_indices, filaments.attachments):
@@ -168,6 +171,7 @@ def share_exclusions(system: openmm.System) -> None:
     system : openmm.System
         Its forces are changed in place.
     """
+    require_kind(system, openmm.System, "system")
     forces = [force for force in system.getForces() if isinstance(force, _WITH_EXCLUSIONS)]
     everything = sorted(set().union(*(_exclusions(force) for force in forces)))
     for force in forces:
@@ -195,6 +199,8 @@ def crossing_barrier(diameter: Scalar, spacing: Scalar, stiffness: Scalar) -> fl
     diameter = positive(diameter, LENGTH, "diameter")
     spacing = positive(spacing, LENGTH, "spacing")
     stiffness = positive(stiffness, STIFFNESS, "stiffness")
+    if diameter > _MOST_BEADS * spacing:
+        raise InputError(f"spacing is {spacing:g} nm, which is too small beside the diameter of {diameter:g} nm.")
     number = math.ceil(diameter / spacing) + 1
     row = np.arange(-number, number + 1)
     offset = np.linspace(0.0, 0.5, 26)
@@ -264,6 +270,8 @@ def contact_force(
         If beads are so far apart, or so soft, that filaments can pass through each other: if ``crossing_barrier`` is
         below 25 k_B T.
     """
+    require_filaments(filaments)
+    require_kind(system, openmm.System, "system")
     beads = filaments.bead_indices
     if not any(len(one) for one in beads):
         raise InputError("There are no beads to touch: call add_beads before the filaments are put into a System.")
@@ -343,12 +351,12 @@ def particle_diameters(particles: Indices, particle_diameter: Numbers | None) ->
 
 def outside_particles(filaments: FilamentCollection, system: openmm.System, particles: Indices) -> IntArray:
     """Particles that take part in contacts, which are none of the filaments'; an InputError if they are not there."""
-    if not isinstance(particles, Collection):
-        raise InputError(f"particles must be a sequence of particle indices, but is {shown(particles)}.")
+    require_filaments(filaments)
+    require_kind(system, openmm.System, "system")
     count = system.getNumParticles()
     filled = [*filaments.node_indices, *filaments.control_point_indices, filaments.attachment_indices]
     own = set(np.concatenate(filled).tolist())
-    indices = [whole_number(particle, 0, "an index in particles") for particle in particles]
+    indices = whole_numbers(particles, 0, "particles")
     for index in indices:
         if index >= count:
             raise InputError(f"particles contains {index}, but the System has {count} particles.")

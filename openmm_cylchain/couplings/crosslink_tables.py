@@ -83,20 +83,25 @@ class CrosslinkTable:
             self._set(name, getattr(places, name))
         # They share their arrays.
         object.__setattr__(self, "_places", places)
-        active = np.array(self.active, dtype=bool)
+        active = np.array(self.active, dtype=object)
+        if not active.ndim or not all(isinstance(one, (bool, np.bool_)) for one in active.ravel()):
+            raise InputError("active of a table of crosslinks must be an array of True and False.")
+        active = active.astype(bool)
         self._set("active", active if len(active) else np.ones(len(self.numbers), dtype=bool))
         self._check()
 
     def _column(self, name):
         try:
             column = np.array(getattr(self, name), dtype=np.float64)
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, OverflowError):
             raise InputError(f"{name} of a table of crosslinks must be an array of numbers.") from None
         if name != "maximum_extension" and not np.all(np.isfinite(column)):
             raise InputError(f"{name} of a table of crosslinks must be finite, but contains NaN or infinity.")
+        if not column.ndim:
+            raise InputError(f"{name} of a table of crosslinks must be an array, but is {column:g}.")
         if name not in _WHOLE:
             return column
-        if np.any(column != np.round(column)):
+        if np.any(column != np.round(column)) or np.any(np.abs(column) >= 2.0**63):
             raise InputError(f"{name} of a table of crosslinks must be whole numbers.")
         return np.array(getattr(self, name), dtype=np.int64)
 

@@ -24,7 +24,16 @@ import openmm
 from ..errors import InputError
 from ..filaments.segment_place import SegmentPlace
 from ..mechanics.potentials import STRETCHING_POTENTIALS
-from ..units.quantities import LENGTH, STIFFNESS, non_negative, positive, thermal_energy, whole_number
+from ..units.quantities import (
+    LENGTH,
+    STIFFNESS,
+    non_negative,
+    positive,
+    require_kind,
+    thermal_energy,
+    true_or_false,
+    whole_number,
+)
 from ..units.types import FloatArray, FloatOrArray, Indices, IntArray, Scalar, Vector
 from .crosslink_computation import lengths_and_vectors, slopes_of, thermal_stiffness_of
 from .crosslink_tables import CrosslinkTable
@@ -170,8 +179,9 @@ class Crosslinks:
             raise InputError("These crosslinks are already in a System; make another Crosslinks for another System.")
         if whole_number(force_group, 0, "force_group") > 31:
             raise InputError(f"force_group must be between 0 and 31, but is {force_group}.")
+        require_kind(system, openmm.System, "system")
         self._initial.places.check(self._initial.numbers, system.getNumParticles())
-        periodic = is_periodic(system) if periodic is None else bool(periodic)
+        periodic = is_periodic(system) if periodic is None else true_or_false(periodic, "periodic")
         if periodic:
             check_rest_lengths(self._initial.numbers, self._initial.rest_length, default_box(system))
         kind: Any = NativeLinks if is_of_compiled_engine(system) else PortableLinks
@@ -299,10 +309,11 @@ class Crosslinks:
             For a number that is not that of a crosslink of this Context.
         """
         chosen, store = _as_numbers(numbers), self._store_for(context)
+        active = true_or_false(active, "active")
         if store is None:
-            self._initial = self._initial.switched(chosen, bool(active))
+            self._initial = self._initial.switched(chosen, active)
         else:
-            store.switch(context, chosen, bool(active))
+            store.switch(context, chosen, active)
 
     def pairs(self, context: openmm.Context | None) -> IntArray:
         """The particles of all crosslinks of a Context: an int array (n, 2), in the order of ``numbers``.
@@ -392,6 +403,7 @@ class Crosslinks:
             If the crosslinks are not known, or one is longer than its potential allows.
         """
         store = self._store_in(context)
+        require_kind(state, openmm.State, "state")
         table = store.table(context)
         positions = state.getPositions(asNumpy=True)._value
         box, segment_box = store.boxes(context, state)
@@ -479,8 +491,9 @@ def _check_in_context(store, context, numbers, rest_lengths):
 
 
 def _as_numbers(numbers):
-    array = np.atleast_1d(np.asarray(numbers))
-    if array.dtype.kind in "iu" and np.all(array >= 0):
-        return array.ravel().astype(np.int64)
-    array = np.atleast_1d(np.asarray(numbers, dtype=object)).ravel()
-    return np.array([whole_number(number, 0, "The number of a crosslink") for number in array], dtype=np.int64)
+    array = np.atleast_1d(numbers if isinstance(numbers, np.ndarray) else np.asarray(numbers, dtype=object)).ravel()
+    if array.dtype.kind not in "iu" or np.any(array < 0):
+        array = np.array([whole_number(number, 0, "The number of a crosslink") for number in array], dtype=np.int64)
+    if np.any(array >= 2**31):
+        raise InputError(f"There is no crosslink {array.max()}: numbers are below 2^31.")
+    return array.astype(np.int64)

@@ -9,7 +9,7 @@ import openmm
 
 from ..errors import InputError
 from ..filaments.segment_place import SegmentPlace
-from ..units.quantities import ANGLE, ENERGY, in_units_of, positive, shown, unit_vector
+from ..units.quantities import ANGLE, ENERGY, in_units_of, positive, require_kind, shown, unit_vector
 from ..units.types import FloatArray, Indices, IntArray, Scalar, Vector
 from .beam_curves import BeamCurves
 from .crosslink_tables import CrosslinkTable
@@ -77,6 +77,7 @@ class Joints:
         InputError
             If these joints are in a System already, or one is not on a filament of beam elements of it.
         """
+        require_kind(system, openmm.System, "system")
         curves = BeamCurves.of_system(system) if is_of_compiled_engine(system) else None
         if curves is None:
             raise InputError("Joints are between filaments of beam elements, of which this System has none.")
@@ -164,6 +165,8 @@ class Joints:
     def _measure(self, context):
         if self._curves is None:
             raise InputError("These joints are not in a System yet: call add_to before Contexts are created.")
+        if not isinstance(context, openmm.Context):
+            raise InputError(f"context must be an openmm.Context, but is {shown(context)}.")
         table = self._links.table(context)
         state = context.getState(positions=True)
         positions = state.getPositions(asNumpy=True)._value

@@ -228,6 +228,10 @@ def _as_place(end):
     # Particle, partner, fraction and point.
     if isinstance(end, SegmentPlace):
         return end.first, end.second, end.fraction, (0.0, 0.0, 0.0)
-    if np.ndim(getattr(end, "_value", end)) == 0:
+    try:
+        is_number = np.ndim(getattr(end, "_value", end)) == 0
+    except ValueError:
+        raise InputError(f"A place must be a particle, a SegmentPlace or a point, but is {shown(end)}.") from None
+    if is_number:
         return whole_number(end, 0, "particle"), NOWHERE, 0.0, (0.0, 0.0, 0.0)
     return NOWHERE, NOWHERE, 0.0, tuple(vector(end, LENGTH, "The fixed point of a crosslink"))

@@ -10,7 +10,8 @@ import numpy as np
 import openmm
 from openmm import unit
 
-from ..filaments.collection import FilamentCollection
+from ..filaments.collection import FilamentCollection, require_filaments
+from ..units.quantities import require_kind
 from ..units.types import IntArray
 from .capsule_contacts import as_capsule_contact_force
 from .walls import as_filament_wall_force, shape_of_wall
@@ -83,6 +84,7 @@ class ContactForces:
 
     def loads_of_filaments(self, filaments: FilamentCollection) -> Any:
         """The sum of the sizes of all forces on each filament: an array (filaments,) with units."""
+        require_filaments(filaments)
         loads = np.zeros(max(len(filaments), int(self.pairs.max(initial=-1)) + 1))
         np.add.at(loads, self.pairs[:, 0], self.loads._value)
         other = self.pairs[:, 0] != self.pairs[:, 1]
@@ -167,6 +169,7 @@ def contact_forces(context: openmm.Context) -> list[ContactForces]:
 
 
 def _wall_forces(context: openmm.Context, readers: Mapping[int, int]) -> list[WallForces]:
+    require_kind(context, openmm.Context, "context")
     found = []
     for number, force in enumerate(context.getSystem().getForces()):
         own = as_filament_wall_force(force)
@@ -204,6 +207,7 @@ def _of_present_positions(context, number, force, shape, stiffness):
 
 
 def _contact_forces(context: openmm.Context, readers: Mapping[int, int]) -> list[ContactForces]:
+    require_kind(context, openmm.Context, "context")
     found = []
     for number, force in enumerate(context.getSystem().getForces()):
         own = as_capsule_contact_force(force)
@@ -227,6 +231,7 @@ def _taken(force, context, reader):
 
 
 def _on_filaments(forces, filaments):
+    require_filaments(filaments)
     values = forces._value
     sums = np.zeros((len(filaments), 3))
     for number, particles in enumerate(zip(filaments.node_indices, filaments.control_point_indices)):

@@ -8,10 +8,20 @@ import numpy as np
 import openmm
 
 from ..errors import InputError
-from ..filaments.collection import FilamentCollection
+from ..filaments.collection import FilamentCollection, require_filaments
 from ..output.files import TextFile
 from ..output.reporters import FilamentsReporter
-from ..units.quantities import FORCE, LENGTH, TIME, VELOCITY, in_units_of, shown, unit_vector, whole_number
+from ..units.quantities import (
+    FORCE,
+    LENGTH,
+    TIME,
+    VELOCITY,
+    in_units_of,
+    shown,
+    unit_vector,
+    whole_number,
+    whole_numbers,
+)
 from ..units.types import FloatArray, Indices, Numbers, Scalar, Vector, Vectors
 
 if TYPE_CHECKING:
@@ -46,7 +56,7 @@ def constant_force(particles: Indices, forces: Vectors) -> openmm.CustomExternal
     InputError
         For forces of the wrong shape or unit, or particle indices that are none.
     """
-    particles = [whole_number(particle, 0, "particle") for particle in particles]
+    particles = whole_numbers(particles, 0, "particles")
     force = openmm.CustomExternalForce(_ENERGY)
     force.setName(CONSTANT_FORCE_NAME)
     for name in _COMPONENTS:
@@ -69,6 +79,8 @@ def change_constant_force(force: openmm.CustomExternalForce, context: openmm.Con
         of each filament in turn; ``tension_forces`` has their forces.
     """
     _refuse_unless_constant(force)
+    if not isinstance(context, openmm.Context) or not _has_force(context.getSystem(), force):
+        raise InputError(f"context must be one of the System that has the force, but is {shown(context)}.")
     for index, components in enumerate(_as_forces(forces, force.getNumParticles())):
         particle, _ = force.getParticleParameters(index)
         force.setParticleParameters(index, particle, components)
@@ -81,6 +93,10 @@ def is_constant_force(force: openmm.Force) -> bool:
         return False
     names = (force.getPerParticleParameterName(i) for i in range(force.getNumPerParticleParameters()))
     return tuple(names) == _COMPONENTS
+
+
+def _has_force(system, force):
+    return any(int(one.this) == int(force.this) for one in system.getForces())
 
 
 def _refuse_unless_constant(force):
@@ -124,8 +140,9 @@ def constant_tension(
     InputError
         For a filament that does not exist, or a tension or direction that is none.
     """
+    require_filaments(filaments)
     every = range(len(filaments))
-    numbers = every if numbers is None else [whole_number(number, 0, "filament") for number in numbers]
+    numbers = every if numbers is None else whole_numbers(numbers, 0, "numbers")
     for number in numbers:
         if number not in every:
             raise InputError(f"Filament {number} does not exist; there are {len(filaments)}.")
@@ -200,6 +217,7 @@ class ConstantVelocityPulling(FilamentsReporter):
         start_time: Scalar = 0.0,
         append: bool = False,
     ) -> None:
+        require_filaments(filaments)
         self._tethers = _tether_numbers(tethers, len(filaments.tethers))
         named = [filaments.tethers[number] for number in self._tethers]
         count = len(named)

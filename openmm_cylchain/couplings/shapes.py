@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from ..errors import InputError
-from ..units.quantities import LENGTH, positive, unit_vector, vector
-from ..units.types import FloatArray, FloatOrArray, Scalar, Vector
+from ..units.quantities import LENGTH, in_units_of, positive, unit_vector, vector
+from ..units.types import FloatArray, FloatOrArray, Scalar, Vector, Vectors
 
 # In nm^2: keeps the derivative of a square root finite at its zero, in single precision as well.
 _TINY = "1e-30"
@@ -44,9 +43,19 @@ class Shape(ABC):
     def room(self) -> float:
         """In nm."""
 
+    def square_depth(self, positions: Vectors) -> FloatOrArray:
+        """The square of the depth, in nm^2, for positions (..., 3); zero inside.
+
+        InputError for positions that are none.
+        """
+        points = np.asarray(in_units_of(positions, LENGTH, "positions"))
+        if not points.ndim or points.shape[-1] != 3:
+            raise InputError(f"positions must have the shape (..., 3), but have the shape {points.shape}.")
+        return self._square_depth(points)
+
     @abstractmethod
-    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
-        """The square of the depth, in nm^2, for positions (..., 3); zero inside."""
+    def _square_depth(self, positions: FloatArray) -> FloatOrArray:
+        """The same, for an array in nm."""
 
     @property
     @abstractmethod
@@ -65,8 +74,8 @@ class Face(Shape):
     def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Depths beyond the face in nm, negative inside, and their gradients, for positions (..., 3)."""
 
-    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
-        depths, _ = self.depths(np.asarray(positions))
+    def _square_depth(self, positions: FloatArray) -> FloatOrArray:
+        depths, _ = self.depths(positions)
         return np.maximum(0.0, depths) ** 2
 
 
@@ -168,8 +177,8 @@ class Slab(Shape):
     def room(self) -> float:
         return 0.5 * self.thickness
 
-    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
-        height = np.abs((np.asarray(positions) - self.point) @ self.normal)
+    def _square_depth(self, positions: FloatArray) -> FloatOrArray:
+        height = np.abs((positions - self.point) @ self.normal)
         return np.maximum(0.0, height - 0.5 * self.thickness) ** 2
 
     @property
@@ -301,8 +310,7 @@ class Box(Shape):
     def room(self) -> float:
         return 0.5 * float(np.min(self.upper - self.lower))
 
-    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
-        positions = np.asarray(positions)
+    def _square_depth(self, positions: FloatArray) -> FloatOrArray:
         beyond = np.maximum(0.0, np.maximum(self.lower - positions, positions - self.upper))
         return np.sum(beyond**2, axis=-1)
 

@@ -14,6 +14,7 @@ from .shapes import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
 _MOST_DRAWS = 10**7
 """Points that may be drawn for one on a part of the wall."""
 
+_MOST_POINTS = 10**7
 _BATCH = 4096
 _ROUNDING = 1e-9
 """How far beyond the region a point on the wall may be, over the size of numbers."""
@@ -42,6 +43,8 @@ def random_points_on(
     if not isinstance(wall, Shape):
         raise InputError(f"wall must be a shape, such as Plane(point, normal), but is {wall!r}.")
     count = whole_number(count, 1, "count")
+    if count > _MOST_POINTS:
+        raise InputError(f"count must be at most {_MOST_POINTS:.0e}, but is {count:.3g}.")
     if isinstance(wall, (Plane, Slab, Cylinder)) and (lower is None or upper is None):
         raise InputError(
             f"A {type(wall).__name__} has no end: give lower and upper, the corners of the box to stay in."
@@ -50,7 +53,7 @@ def random_points_on(
     high = np.full(3, np.inf) if upper is None else vector(upper, LENGTH, "upper")
     if np.any(low > high):
         raise InputError(f"lower must not be above upper, but they are {low.tolist()} and {high.tolist()} nm.")
-    generator = np.random.default_rng(seed)
+    generator = np.random.default_rng(whole_number(seed, 0, "seed"))
     draw = _SAMPLERS[type(wall)]
     slack = _ROUNDING * max(np.abs(corner[np.isfinite(corner)]).max(initial=0.0) for corner in (low, high))
     found, drawn = np.zeros((0, 3)), 0

@@ -15,8 +15,8 @@ import openmm
 
 from ..engine_choice import available_engines, choose_engine
 from ..errors import InputError
-from ..filaments.collection import FilamentCollection
-from ..units.quantities import LENGTH, STIFFNESS, in_units_of, positive, shown
+from ..filaments.collection import FilamentCollection, require_filaments
+from ..units.quantities import LENGTH, STIFFNESS, in_units_of, positive, shown, whole_numbers
 from ..units.types import FloatArray, Indices, Numbers, Scalar
 from .contacts import outside_particles
 from .shapes import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, number
@@ -54,8 +54,8 @@ def wall_force(shape: Shape, stiffness: Scalar, particles: Indices) -> openmm.Cu
     expression = ";".join([f"{number(0.5 * stiffness)}*({square_depth})", *definitions])
     force = openmm.CustomExternalForce(expression)
     force.setName(f"{WALL_NAME} ({type(shape).__name__.lower()})")
-    for particle in particles:
-        force.addParticle(int(particle), [])
+    for particle in whole_numbers(particles, 0, "particles"):
+        force.addParticle(particle, [])
     return force
 
 
@@ -109,6 +109,7 @@ def filament_wall_force(
     if not isinstance(shape, Shape):
         raise InputError(f"shape must be a Shape such as Sphere, but is {shown(shape)}.")
     stiffness = positive(stiffness, STIFFNESS, "stiffness")
+    require_filaments(filaments)
     radii = _radii(radius, len(filaments), "radius", shape)
     spheres = outside_particles(filaments, system, particles)
     sphere_radii = _radii(particle_radius, len(spheres), "particle_radius", shape)

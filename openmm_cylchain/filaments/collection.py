@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 import openmm
 
+from ..errors import InputError
 from ..mechanics.flow import Flow
 from ..mechanics.redistribution import ChainSet
 from ..units.types import Indices, IntArray, Vectors
@@ -71,3 +72,10 @@ class FilamentCollection(Protocol):
     def chain_set(self, system: openmm.System) -> ChainSet: ...
 
     def in_context(self, context: openmm.Context) -> CollectionInContext: ...
+
+
+def require_filaments(filaments: Any) -> None:
+    """Raise InputError for what is no Filaments object."""
+    # Of the class: the property itself refuses filaments that are not in a System yet, which is another mistake.
+    if not hasattr(type(filaments), "node_indices"):
+        raise InputError(f"filaments must be a Filaments object, but is {type(filaments).__name__}.")

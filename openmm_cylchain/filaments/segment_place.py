@@ -43,7 +43,7 @@ class SegmentPlace:
             raise InputError(f"SegmentPlace: a place between particle {self.first} and itself does not exist.")
         try:
             fraction = float(self.fraction)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             fraction = math.nan
         if not 0.0 <= fraction <= 1.0:
             raise InputError(f"SegmentPlace: fraction must be a number between 0 and 1, but is {shown(self.fraction)}.")

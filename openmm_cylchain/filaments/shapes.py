@@ -70,7 +70,7 @@ def ring(
 ) -> Points:
     """A ring without strains: a regular polygon, or a circle of beam elements."""
     segments = _number_of_ring(number_of_segments(segments, label), label)
-    center, planar = vector(center, LENGTH, f"{label}: center"), _flag(planar, f"{label}: planar")
+    center, planar = vector(center, LENGTH, f"{label}: center"), true_or_false(planar, f"{label}: planar")
     axis = unit_vector(normal, label, "normal")
     return filament_type.segment_kind.ring(filament_type, segments, temperature, center, axis, planar)
 
@@ -95,7 +95,7 @@ def drawn(
     """A filament from the exact equilibrium of the free discrete chain."""
     segments = number_of_segments(segments, label)
     start = vector(start, LENGTH, f"{label}: start")
-    planar = _flag(planar, f"{label}: planar")
+    planar = true_or_false(planar, f"{label}: planar")
     if direction is not None:
         direction = unit_vector(direction, label)
         direction = planar_direction(direction, label) if planar else direction
@@ -146,7 +146,7 @@ def new_filament(
     InputError if forces are not defined there, or the filament is not what it is said to be.
     """
     positions, control_points = points
-    closed, planar = _flag(closed, f"{label}: closed"), _flag(planar, f"{label}: planar")
+    closed, planar = true_or_false(closed, f"{label}: closed"), true_or_false(planar, f"{label}: planar")
     if closed:
         _number_of_ring(len(positions), label)
     check_shape(filament_type, positions, label, closed)
@@ -161,7 +161,7 @@ def new_filament(
     return Filament(filament_type, positions, held, closed, planar, propulsion, control_points, held_tangents)
 
 
-def _flag(value, name):
+def true_or_false(value, name):
     if not isinstance(value, (bool, np.bool_)):
         raise InputError(f"{name} must be True or False, but is {shown(value)}.")
     return bool(value)

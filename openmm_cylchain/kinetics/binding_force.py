@@ -12,7 +12,7 @@ from ..engine_choice import load_plugin
 from ..errors import InputError
 from ..filaments.filament import Filament
 from ..mechanics.geometry import to_nearest_images
-from ..units.quantities import thermal_energy
+from ..units.quantities import require_kind, thermal_energy
 from ..units.types import FloatArray, IntArray
 from .first_places import FirstPlaces, contour_of
 from .hand import Hand
@@ -118,9 +118,10 @@ def place_linkers(
 def _add_hand(force, hand, filaments, name):
     chains = [i for i, filament in enumerate(filaments) if hand.binds(filament.type)]
     if not chains:
+        types = sorted({filament.type.name for filament in filaments})
         raise InputError(
             f"Linkers {name!r}: a hand binds to filaments of the type {' or '.join(hand.binds_to)}, of which there are "
-            "none: change its binds_to."
+            f"none among {', '.join(types)}: change its binds_to."
         )
     longest = max(contour_of(filament)[-1] for filament in filaments if hand.binds(filament.type))
     if hand.site_spacing is not None and hand.site_spacing > longest * (1.0 + 1e-9):
@@ -181,6 +182,7 @@ def table_of(force: Any, context: openmm.Context) -> LinkerTable:
 
 def set_table(force: Any, context: openmm.Context, table: LinkerTable) -> None:
     """Give a Context the linkers of a table; InputError if they do not fit types, anchors or filaments."""
+    require_kind(table, LinkerTable, "table")
     columns = [np.asarray(column).ravel().tolist() for column in (
         table.numbers, table.types, table.anchors, table.filaments, table.arc_lengths
     )]  # fmt: skip

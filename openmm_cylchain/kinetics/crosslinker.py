@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from ..units.quantities import LENGTH, STIFFNESS, non_negative, positive, thermal_energy
+from ..units.quantities import LENGTH, STIFFNESS, non_negative, positive, require_kind, thermal_energy, true_or_false
 from ..units.types import Scalar
 from .hand import Hand
 
@@ -60,7 +60,9 @@ class Crosslinker:
         hands = tuple(given) if isinstance(given, Sequence) else ()
         if len(hands) != 2 or not all(isinstance(hand, Hand) for hand in hands):
             raise InputError(f"Crosslinker {self.name!r}: hands must be a Hand or two of them, but are {self.hands!r}.")
+        require_kind(self.name, str, "Crosslinker: name")
         label = f"Crosslinker {self.name!r}:"
+        true_or_false(self.same_filament, f"{label} same_filament")
         object.__setattr__(self, "hands", hands)
         object.__setattr__(self, "stiffness", positive(self.stiffness, STIFFNESS, f"{label} stiffness"))
         object.__setattr__(self, "rest_length", non_negative(self.rest_length, LENGTH, f"{label} rest_length"))
@@ -76,6 +78,7 @@ class Crosslinker:
         Where this is small, or the reach is below the rest length, the reach cuts off places that the spring would
         allow, so that the equilibrium of bound linkers is not that of their energies.
         """
+        require_kind(hand, Hand, "hand")
         extension = hand.reach - self.rest_length
         kT = thermal_energy(temperature)
         energy = 0.5 * self.stiffness * extension * abs(extension)

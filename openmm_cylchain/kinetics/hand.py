@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..errors import InputError
 from ..filaments.chain_type import ChainType
 from ..units.quantities import (
@@ -16,8 +14,11 @@ from ..units.quantities import (
     VELOCITY,
     finite_number,
     non_negative,
+    one_of,
     positive,
+    require_kind,
     shown,
+    true_or_false,
 )
 from ..units.types import Scalar
 
@@ -128,8 +129,7 @@ class Hand:
         convert("speed", finite_number, VELOCITY)
         convert("stall_force", positive, FORCE)
         convert("site_spacing", positive, LENGTH)
-        if not isinstance(self.walks_backward, (bool, np.bool_)):
-            raise InputError(f"Hand: walks_backward must be True or False, but is {shown(self.walks_backward)}.")
+        true_or_false(self.walks_backward, "Hand: walks_backward")
         if self.strain_share > 1.0:
             raise InputError(f"Hand: strain_share must be between 0 and 1, but is {self.strain_share:g}.")
         if self.strain_share > 0.0 and self.unbinding_force is not None:
@@ -138,8 +138,7 @@ class Hand:
             raise InputError("Hand: catch_rate and catch_force must be given together.")
         if self.speed == 0.0 and (self.stall_force is not None or self.walks_backward):
             raise InputError("Hand: stall_force and walks_backward say how it walks, but its speed is zero.")
-        if self.at_end not in AT_ENDS:
-            raise InputError(f"Hand: at_end must be one of {', '.join(AT_ENDS)}, but is {self.at_end!r}.")
+        one_of(self.at_end, AT_ENDS, "Hand: at_end")
         if self.binds_to is not None:
             kinds = [self.binds_to] if isinstance(self.binds_to, (str, ChainType)) else self.binds_to
             kinds = kinds if isinstance(kinds, (Sequence, set, frozenset)) else ()
@@ -157,6 +156,7 @@ class Hand:
 
     def binds(self, filament_type: ChainType) -> bool:
         """Whether it binds to filaments of a type."""
+        require_kind(filament_type, ChainType, "filament_type")
         return self.binds_to is None or filament_type.name in self.binds_to
 
     def __repr__(self) -> str:

@@ -5,10 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..units.quantities import DIMENSIONLESS, in_units_of, whole_number
 from ..units.types import BoolArray, FloatArray, IntArray
 
 STATES = ("unbound", "one hand bound", "both hands bound")
 """What a linker may be, by how many of its ends hold something; an anchored linker always holds its anchor."""
+
+_LARGEST_NUMBER = 2**31 - 1
 
 
 @dataclass(frozen=True)
@@ -39,8 +42,25 @@ class LinkerTable:
     next_number: int
 
     def __post_init__(self) -> None:
-        count = len(self.numbers)
-        shapes = {"types": (count,), "anchors": (count,), "filaments": (count, 2), "arc_lengths": (count, 2)}
+        for name in ("numbers", "types", "anchors", "filaments", "arc_lengths"):
+            column = np.asarray(in_units_of(getattr(self, name), DIMENSIONLESS, f"LinkerTable: {name}"))
+            if name != "arc_lengths":
+                if np.any(column != np.rint(column)) or np.any(np.abs(column) > _LARGEST_NUMBER):
+                    raise InputError(f"LinkerTable: {name} must be whole numbers of 32 bits.")
+                column = column.astype(np.int64)
+            object.__setattr__(self, name, column)
+        next_number = whole_number(self.next_number, 0, "LinkerTable: next_number")
+        if next_number > _LARGEST_NUMBER:
+            raise InputError(f"LinkerTable: next_number must be at most {_LARGEST_NUMBER}, but is {next_number}.")
+        object.__setattr__(self, "next_number", next_number)
+        count = self.numbers.size
+        shapes = {
+            "numbers": (count,),
+            "types": (count,),
+            "anchors": (count,),
+            "filaments": (count, 2),
+            "arc_lengths": (count, 2),
+        }
         for name, shape in shapes.items():
             if np.shape(getattr(self, name)) != shape:
                 raise InputError(f"LinkerTable: {name} must have the shape {shape}.")
@@ -60,6 +80,8 @@ class LinkerTable:
 
     def counts(self, linker_type: int | None = None) -> tuple[int, int, int]:
         """How many linkers, of a type or of all, are in each state of ``STATES``."""
+        if linker_type is not None:
+            linker_type = whole_number(linker_type, 0, "linker_type")
         held = self.held if linker_type is None else self.held[np.asarray(self.types) == linker_type]
         unbound, one, both = np.bincount(held, minlength=3)
         return int(unbound), int(one), int(both)

@@ -2,9 +2,11 @@
 
 import math
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import openmm
 from openmm import unit
 
 from ..errors import InputError, LinkerWarning
@@ -97,6 +99,7 @@ def as_linkers(
     if not isinstance(kind, Crosslinker):
         raise InputError(f"Linkers are described by a Crosslinker, not by {kind!r}.")
     label = f"Linkers {kind.name!r}:"
+    seed = whole_number(seed, 0, f"{label} seed")
     if (count is not None) + (concentration is not None) + (anchors is not None) != 1:
         raise InputError(f"{label} give one of count, concentration and anchors.")
     room = None if volume is None else positive(volume, VOLUME, f"{label} volume")
@@ -119,6 +122,17 @@ def as_linkers(
     if number > MOST_LINKERS:
         raise InputError(f"{label} count must be at most {MOST_LINKERS}, but is {number}.")
     return Linkers(kind, number, None, room, None, _as_bound(bound, number, label), seed)
+
+
+def refuse_linkers_without_volume(linkers: Sequence[Linkers], system: openmm.System) -> None:
+    """Raise InputError for linkers that move freely in a System without a periodic box, in no volume."""
+    for own in linkers:
+        free = own.anchors is None and own.concentration is None and own.volume is None
+        if free and not system.usesPeriodicBoundaryConditions():
+            raise InputError(
+                f"Linkers {own.kind.name!r} need a volume or a concentration, since there is no periodic box: give "
+                "add_linkers one of them, or box_vectors to the System."
+            )
 
 
 def warn_if_springs_do_not_fit(kind: Crosslinker, temperature: Scalar) -> None:

@@ -19,7 +19,7 @@ import openmm
 
 from ..errors import InputError
 from ..filaments.beam_refusals import refuse_beams
-from ..filaments.collection import FilamentCollection
+from ..filaments.collection import FilamentCollection, require_filaments
 from ..mechanics.redistribution import ChainSet
 from ..mechanics.tension import axial_tensions, filament_tensions
 from ..units.quantities import whole_number
@@ -125,19 +125,13 @@ def _cut_unfinished_line(path, header):
         file.truncate(end)
 
 
-def _check_filaments(filaments):
-    # Of the class: the property itself refuses filaments that are not in a System yet, which is another mistake.
-    if not hasattr(type(filaments), "node_indices"):
-        raise InputError(f"filaments must be a Filaments object, but is {type(filaments).__name__}.")
-
-
 class FilamentsReporter(TableReporter):
     """What reporters of things whose number does not change have in common: arrays (reports, things)."""
 
     def __init__(
         self, file: TextFile | None, reportInterval: int, filaments: FilamentCollection, append: bool = False
     ) -> None:  # noqa: N803 - OpenMM's name
-        _check_filaments(filaments)
+        require_filaments(filaments)
         self._filaments = filaments
         self._nodes = filaments.node_indices
         super().__init__(file, reportInterval, append)
@@ -234,7 +228,7 @@ class TensionReporter(FilamentsReporter):
         joints: bool = False,
         mean: bool = False,
     ) -> None:
-        _check_filaments(filaments)
+        require_filaments(filaments)
         refuse_beams(filaments, "a TensionReporter")
         self._joints = bool(joints)
         self._mean = bool(mean)
@@ -310,7 +304,7 @@ class TetherReporter(FilamentsReporter):
     def __init__(
         self, file: TextFile | None, reportInterval: int, filaments: FilamentCollection, append: bool = False
     ) -> None:  # noqa: N803 - OpenMM's name
-        _check_filaments(filaments)
+        require_filaments(filaments)
         if not filaments.tethers:
             raise InputError("There are no tethers to report: call add_tether first.")
         super().__init__(file, reportInterval, filaments, append)
@@ -441,7 +435,7 @@ class LinkerReporter(FilamentsReporter):
         append: bool = False,
         places: str | Path | None = None,
     ) -> None:
-        _check_filaments(filaments)
+        require_filaments(filaments)
         if not filaments.linkers:
             raise InputError("There are no linkers to report: call add_linkers first.")
         if places is not None and not isinstance(places, (str, Path)):

@@ -17,7 +17,7 @@ import openmm
 from openmm import unit
 
 from ..errors import InputError
-from ..units.quantities import LENGTH, MASS, in_units_of
+from ..units.quantities import LENGTH, MASS, in_units_of, require_kind
 from ..units.types import BoxVectors, Numbers, Vectors
 from ..version import __version__
 from .files import TextFile
@@ -215,6 +215,8 @@ def _check_topology(topology, system):
 
     if not isinstance(topology, app.Topology):
         raise InputError(f"topology must be an openmm.app.Topology, but is {topology!r}.")
+    if system is not None:
+        require_kind(system, openmm.System, "system")
     if system is not None and system.getNumParticles() != topology.getNumAtoms():
         raise InputError(
             f"The Topology has {topology.getNumAtoms()} atoms, but the System has {system.getNumParticles()} particles."

@@ -7,7 +7,6 @@ the table and the key, and says what to do.
 
 import dataclasses
 import re
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,12 +38,7 @@ from .tables.linkers import HAND, LINKERS, binds_to, read_linkers
 from .tables.particles import PARTICLES, read_particles
 from .tables.simulation import SIMULATION, SimulationSettings, read_seed, read_simulation
 from .tables.solvent import BOX, FLOW, SOLVENT, Solvent, read_flow, read_solvent
-from .toml_lines import lines_of
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from .toml_lines import lines_of, read_toml
 
 TABLES = (SOLVENT, BOX, FLOW, FILAMENT, PARTICLES, LINKERS, LINK, JOINT, TETHER, PULL, CONTACTS, WALL, SIMULATION)
 """All kinds of tables, in the order of the reference."""
@@ -125,13 +119,7 @@ def read_configuration(path):
 def parse_configuration(text, folder="."):
     """Read and check the text of a configuration, whose files are named from a folder; see ``read_configuration``."""
     text_of_lines = text.replace("\r\n", "\n")
-    try:
-        entries = tomllib.loads(text_of_lines)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f'not valid TOML: {error}. Texts, quantities among them, need quotes: "360 nm".') from None
-    except (ValueError, RecursionError) as error:
-        # Numbers of thousands of digits, and lists within lists.
-        raise InputError(f"not valid TOML: {error}.") from None
+    entries = read_toml(text_of_lines)
     return configuration_of(entries, text, folder, lines_of(text_of_lines, entries))
 
 

@@ -1,6 +1,6 @@
-"""In which line of a TOML file each table, key and item of a list stands.
+"""What tomllib makes of a text, and in which line of it each table, key and item of a list stands.
 
-tomllib does not say. The text is walked through once more, and what is found must be just what tomllib has read:
+tomllib does not say where. The text is walked through once more, and what is found must be just what tomllib has read:
 otherwise there are no lines at all, because a wrong one is worse than none.
 """
 
@@ -13,6 +13,8 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+from ..errors import InputError
+
 _BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 _SPACE = re.compile(r"[ \t]*")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -21,6 +23,36 @@ _STRING = re.compile(
     re.DOTALL,
 )
 _PLAIN = re.compile(r"[^,\]}#\n]+")
+_TWICE = re.compile(r"(?:Cannot|Duplicate).*\(at line (\d+), column \d+\)")
+_DEFINED = re.compile(r"\s*(?:(?P<table>\[\[?[^\[\]]*\]\]?)|(?P<key>[\w.\"'-]+)\s*=)")
+
+
+def read_toml(text):
+    """What tomllib makes of a text with line ends that are a line feed; InputError if it is not TOML."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        twice = _TWICE.search(str(error))
+        if twice is None:
+            raise InputError(f'not valid TOML: {error}. Texts, quantities among them, need quotes: "360 nm".') from None
+        raise InputError(f"line {twice[1]}: {_said_twice(str(error), text.splitlines()[int(twice[1]) - 1])}") from None
+    except (ValueError, RecursionError) as error:
+        # Numbers of thousands of digits, and lists within lists.
+        raise InputError(f"not valid TOML: {error}.") from None
+
+
+def _said_twice(error, line):
+    key = re.search(r"inline table key '(.*)'", error)
+    defined = _DEFINED.match(line)
+    if key or not defined:
+        name = f"the key {key[1]!r}" if key else "a key"
+        return f"{name} stands twice between the same braces: give it once."
+    if defined["table"]:
+        return (
+            f"{defined['table']} has come before: give a table once, and each one of a list of tables with two "
+            "brackets, as in [[filament]]."
+        )
+    return f"the key {defined['key']!r} has come before in the same table: give it once."
 
 
 def lines_of(text, entries):

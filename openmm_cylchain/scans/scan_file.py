@@ -1,6 +1,5 @@
 """The file of a scan: a TOML file that names a run, the keys that vary, how many replicas, and what is gathered."""
 
-import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -8,14 +7,9 @@ from ..errors import InputError
 from ..runs.configuration import TABLES, configuration_of, read_configuration
 from ..runs.keys import Choice, ConfigurationError, Inline, Key, Listing, Place, Text, Whole
 from ..runs.table import TableKind, UnknownKeyError
-from ..runs.toml_lines import lines_of
+from ..runs.toml_lines import lines_of, read_toml
 from .grid import Axis, make_runs
 from .quantities import QUANTITIES
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 SCAN = TableKind(
     "scan",
@@ -93,13 +87,12 @@ def read_scan(path):
         raise InputError(f"The scan {path} cannot be read: {error.strerror}.") from None
     except UnicodeDecodeError:
         raise InputError(f"The scan {path} is not UTF-8 text: save it as UTF-8.") from None
+    text_of_lines = text.replace("\r\n", "\n")
     try:
-        raw = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(
-            f'{path}: not valid TOML: {error}. Texts, quantities among them, need quotes: "360 nm".'
-        ) from None
-    lines = lines_of(text.replace("\r\n", "\n"), raw)
+        raw = read_toml(text_of_lines)
+    except InputError as error:
+        raise _named(path, error) from None
+    lines = lines_of(text_of_lines, raw)
     try:
         return _read(path, text, raw, lines)
     except UnknownKeyError as error:
@@ -148,7 +141,7 @@ def _base(path, raw, settings, lines):
         if not file.is_file():
             raise settings.at("base").error(f"{str(file)!r} does not exist.")
         configuration = read_configuration(file)
-        return tomllib.loads(configuration.text.replace("\r\n", "\n")), file.parent, {}
+        return read_toml(configuration.text.replace("\r\n", "\n")), file.parent, {}
     if not isinstance(raw["base"], dict):
         raise ConfigurationError("'base' must be tables: [base.solvent], [[base.filament]] and so on.", ("base",))
     own = {place[1:]: line for place, line in lines.items() if place[0] == "base" and len(place) > 1}
@@ -175,7 +168,7 @@ def _checked(runs, replicas, folder, lines):
     for number, run in enumerate(runs):
         if number % replicas == 0:
             addition = f" That is with {run.point_label}." if run.values else ""
-            files = _check(tomllib.loads(run.text), run.text, folder, lines, addition).start_files
+            files = _check(read_toml(run.text), run.text, folder, lines, addition).start_files
         yield run.with_digest([digest or "" for digest in files.values()])
 
 

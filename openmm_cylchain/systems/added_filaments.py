@@ -150,7 +150,7 @@ class AddedFilaments:
             The filament's number.
         """
         label = self._label(filament_type)
-        points = shapes.given(filament_type, positions, label, tangents, control_points, bool(closed))
+        points = shapes.given(filament_type, positions, label, tangents, control_points, closed)
         return self._add(filament_type, points, label, closed, options)
 
     def add_ring(

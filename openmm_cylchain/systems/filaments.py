@@ -17,6 +17,7 @@ from ..engines.protocol import IntegratorSettings
 from ..errors import InputError
 from ..filaments.attachments import add_virtual_site, attachment_positions, neighbors
 from ..filaments.beam_refusals import refuse_beams
+from ..kinetics.linkers import refuse_linkers_without_volume
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.redistribution import ChainSet
 from ..time_steps.bead_spring_step import refuse_modes
@@ -26,7 +27,7 @@ from ..time_steps.schemes import MODES, check_scheme
 from ..time_steps.step_of_system import recommended_step_of
 from ..time_steps.step_warnings import warn_of_long_step
 from ..time_steps.time_step import TimeStep, as_step
-from ..units.quantities import TEMPERATURE, non_negative
+from ..units.quantities import TEMPERATURE, non_negative, require_kind, true_or_false, whole_number
 from ..units.types import BoxVectors, Numbers, Scalar, Vectors
 from .filaments_in_context import FilamentsInContext
 from .insertion import (
@@ -356,13 +357,15 @@ class Filaments(TiedFilaments):
                 refuse_modes(filament, filament_label(number, filament))
         flow = as_flow(flow)
         warn_of_forces_without_images(system)
+        refuse_linkers_without_volume(self.linkers, system)
         if scheme != "implicit":
             refuse_beams(self, f"scheme {scheme!r}")
         CoupledForces(system).refuse_in_two_stages(scheme)
         bath = self._bath(temperature)
-        if checks:
+        if true_or_false(checks, "checks"):
             warn_of_long_step(self, system, step_size, scheme, bath, particle_friction, flow)
             warn_of_stiff_joints(system, self)
+        random_seed = whole_number(random_seed, 0, "random_seed")
         settings = IntegratorSettings(step_size, scheme, bath, particle_friction, random_seed, flow, checks, precision)
         return self._engine.create_integrator(system, self._placed(), settings)
 
@@ -378,6 +381,7 @@ class Filaments(TiedFilaments):
         -------
         FilamentsInContext
         """
+        require_kind(context, openmm.Context, "context")
         return FilamentsInContext(self._placed(), self._engine, context, self._moved_tethers.setdefault(context, {}))
 
     def chain_set(self, system: openmm.System) -> ChainSet:
@@ -385,6 +389,7 @@ class Filaments(TiedFilaments):
 
         Raises InputError for beam elements, which are no such chains.
         """
+        self._refuse_if_not_in(system)
         refuse_beams(self, "properties of a ChainSet")
         return describe_chains(system, self._placed())
 
@@ -392,5 +397,6 @@ class Filaments(TiedFilaments):
         return self._temperature if temperature is None else non_negative(temperature, TEMPERATURE, "temperature")
 
     def _refuse_if_not_in(self, system):
+        require_kind(system, openmm.System, "system")
         if system.getNumParticles() <= max(nodes.max() for nodes in self.node_indices):
             raise InputError("This is not the System that the filaments were put into: it has too few particles.")

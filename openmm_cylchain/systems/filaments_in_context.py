@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +27,7 @@ from ..kinetics.linker_table import LinkerTable
 from ..kinetics.linkers import LinkerPulls
 from ..mechanics.flow import Flow
 from ..mechanics.tension import components_along, filament_tensions
-from ..units.quantities import FORCE, LENGTH, STIFFNESS, in_units_of, positive, vector, whole_number
+from ..units.quantities import FORCE, LENGTH, STIFFNESS, in_units_of, positive, shown, vector, whole_number
 from ..units.types import Indices, Scalar, Vector, Vectors
 
 
@@ -96,7 +97,7 @@ class FilamentsInContext:
         """
         force = self._binding_force()
         if linker_type is not None:
-            whole_number(linker_type, 0, "linker_type")
+            linker_type = whole_number(linker_type, 0, "linker_type")
             if linker_type >= len(self._placed.linkers):
                 raise InputError(f"There is no type {linker_type} of linkers: there are {len(self._placed.linkers)}.")
         types = range(len(self._placed.linkers)) if linker_type is None else [linker_type]
@@ -242,6 +243,8 @@ class FilamentsInContext:
         points : (tethers, 3) length
         """
         points = np.asarray(in_units_of(points, LENGTH, "points"))
+        if not isinstance(tethers, (Sequence, np.ndarray)) or np.ndim(tethers) != 1:
+            raise InputError(f"tethers must be a sequence of numbers of tethers, but is {shown(tethers)}.")
         if points.shape != (len(tethers), 3):
             raise InputError(f"points must have the shape ({len(tethers)}, 3), but have {points.shape}.")
         old = self.tethers()

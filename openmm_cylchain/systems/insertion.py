@@ -10,7 +10,7 @@ from ..couplings.chain_forces import is_chain_force
 from ..couplings.periodicity import has_box, is_periodic
 from ..errors import InputError
 from ..filaments.filament import CONTROL_POINT_NAME, NODE_NAME, Filament
-from ..units.quantities import LENGTH, in_units_of, shown, vector, whole_number
+from ..units.quantities import LENGTH, in_units_of, require_kind, shown, vector, whole_number
 from ..units.types import BoxVectors, FloatArray, IntArray, Vectors
 
 if TYPE_CHECKING:
@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 def check_target(topology: "app.Topology", system: openmm.System, positions: Vectors) -> FloatArray:
     """Positions (particles, 3) in nm of what is there; raise InputError if they, Topology and System do not match."""
     positions = np.asarray(in_units_of(positions, LENGTH, "positions"))
+    require_kind(system, openmm.System, "system")
+    if not hasattr(topology, "getNumAtoms"):
+        raise InputError(f"topology must be a Topology of OpenMM, but is {shown(topology)}.")
     count = system.getNumParticles()
     if topology.getNumAtoms() != count:
         raise InputError(f"The Topology has {topology.getNumAtoms()} atoms, but the System has {count} particles.")

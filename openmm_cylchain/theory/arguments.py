@@ -7,7 +7,7 @@ from openmm import unit
 from ..errors import InputError
 from ..filaments.chain_type import ChainType
 from ..filaments.straight_segments import STRAIGHT_SEGMENTS
-from ..units.quantities import DIMENSIONLESS, TEMPERATURE, in_units_of, positive, shown, thermal_energy
+from ..units.quantities import DIMENSIONLESS, TEMPERATURE, in_units_of, positive, require_kind, shown, thermal_energy
 from ..units.types import FloatOrArray, Numbers, Scalar
 
 
@@ -16,6 +16,7 @@ def require_straight_segments(filament_type: ChainType) -> None:
 
     Lengths and joints of beads do not fluctuate independently, and beam elements bend inside.
     """
+    require_kind(filament_type, ChainType, "filament_type")
     if filament_type.segment_kind is not STRAIGHT_SEGMENTS:
         raise InputError(
             f"Filament type {filament_type.name!r} has no straight segments of cylinders, for which this closed form "

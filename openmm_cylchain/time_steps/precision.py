@@ -4,15 +4,14 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..errors import InputError
-from ..units.quantities import shown
+from ..units.quantities import one_of
 
 PRECISIONS = ("automatic", "mixed", "double")
 
 
 def check_precision(precision: str) -> None:
     """Raise InputError unless ``precision`` names one of filaments."""
-    if precision not in PRECISIONS:
-        raise InputError(f"precision must be one of {', '.join(PRECISIONS)}, but is {shown(precision)}.")
+    one_of(precision, PRECISIONS, "precision")
 
 
 def refuse_mixed_precision_of_beams(filaments: Iterable[Any], precision: str) -> None:

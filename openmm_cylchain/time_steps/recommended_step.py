@@ -7,12 +7,18 @@ from ..bead_spring.bead_spring_type import BeadSpringType
 from ..engine_choice import default_scheme
 from ..errors import InputError
 from ..filaments.chain_type import ChainType
-from ..mechanics.flow import Flow
+from ..mechanics.flow import Flow, as_flow
 from ..mechanics.friction import SegmentFriction
 from ..units.quantities import (
     DIMENSIONLESS,
+    ENERGY,
+    LENGTH,
+    finite_number,
     positive,
+    require_kind,
     thermal_energy,
+    true_or_false,
+    whole_number,
 )
 from ..units.types import Scalar
 from .bead_spring_step import bead_spring_time_step
@@ -101,6 +107,11 @@ def recommended_time_step(
     """
     scheme = default_scheme() if scheme is None else scheme
     check_scheme(scheme)
+    require_kind(filament_type, ChainType, "filament_type")
+    segments, closed, flow = whole_number(segments, 1, "segments"), true_or_false(closed, "closed"), as_flow(flow)
+    propulsion = finite_number(propulsion, ENERGY / LENGTH, "propulsion")
+    if friction is not None:
+        require_kind(friction, SegmentFriction, "friction")
     if isinstance(filament_type, BeadSpringType):
         return bead_spring_time_step(filament_type, scheme, segments, closed, flow)
     if scheme == MODES:

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import InputError
-from ..units.quantities import shown
+from ..units.quantities import one_of
 from ..units.types import FloatOrArray
 
 EXPLICIT_SCHEMES = ("euler", "midpoint")
@@ -31,5 +30,4 @@ def amplification_of_second_order(z: npt.ArrayLike) -> FloatOrArray:
 
 def check_scheme(scheme: str) -> None:
     """Raise InputError unless ``scheme`` names an integration scheme."""
-    if scheme not in SCHEMES:
-        raise InputError(f"scheme must be one of {', '.join(SCHEMES)}, but is {shown(scheme)}.")
+    one_of(scheme, SCHEMES, "scheme")

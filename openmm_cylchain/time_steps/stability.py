@@ -74,6 +74,7 @@ def _end_friction(friction, length):
 
 def _diffusion_bound(friction, diameter, temperature, confidence):
     kT = thermal_energy(temperature)
+    confidence = positive(confidence, DIMENSIONLESS, "confidence")
     if kT == 0.0:
         return math.inf
     return positive(diameter, LENGTH, "diameter") ** 2 * friction / (8.0 * confidence**2 * kT)

@@ -7,13 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy
 
+from ..errors import InputError
 from ..mechanics.flow import Flow
-from ..units.quantities import (
-    DIMENSIONLESS,
-    TIME,
-    in_units_of,
-    positive,
-)
+from ..units.quantities import DIMENSIONLESS, TIME, non_negative, positive
 from ..units.text import format_time
 from ..units.types import Scalar
 from .schemes import amplification_of_second_order, check_scheme
@@ -100,6 +96,8 @@ def shortest(steps: Iterable[TimeStep]) -> TimeStep:
     return TimeStep(least.step, least.reason, bounds, allowed, unknown, dynamics)
 
 
+_SMALLEST_ERROR = 1e-4
+
 # R(z, theta): what is left, after a step, of a mode that relaxes by z = lambda h in it.
 _DECAYS = {
     "euler": lambda z, theta: 1.0 - z,
@@ -140,9 +138,7 @@ def effective_rate(step: Scalar | TimeStep, scheme: str, rate: Scalar, fastest_r
     """
     check_scheme(scheme)
     step = as_step(step, "step")
-    rate, fastest_rate = (
-        in_units_of(value, TIME**-1, name) for value, name in ((rate, "rate"), (fastest_rate, "fastest_rate"))
-    )
+    rate, fastest_rate = positive(rate, TIME**-1, "rate"), non_negative(fastest_rate, TIME**-1, "fastest_rate")
     return rate * _rate_ratio(scheme, step * rate, _theta(step * fastest_rate))
 
 
@@ -174,7 +170,9 @@ def resolved_relaxation_time(
     check_scheme(scheme)
     step = as_step(step, "step")
     error = positive(error, DIMENSIONLESS, "error")
-    theta = _theta(step * in_units_of(fastest_rate, TIME**-1, "fastest_rate"))
+    if not _SMALLEST_ERROR <= error < 1.0:
+        raise InputError(f"error must be between {_SMALLEST_ERROR:g} and 1, but is {error:g}.")
+    theta = _theta(step * non_negative(fastest_rate, TIME**-1, "fastest_rate"))
 
     def excess(logarithm):
         return min(abs(_rate_ratio(scheme, math.exp(logarithm), theta) - 1.0), 1.0) - error

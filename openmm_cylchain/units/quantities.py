@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import reprlib
+from collections.abc import Collection, Iterable
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,10 @@ MASS = unit.dalton
 MASS_PER_LENGTH = unit.dalton / unit.nanometer
 DIMENSIONLESS = unit.dimensionless
 
+_LARGEST = 1e60
+"""Powers of what is beyond, or below its inverse, are not finite."""
+
+_LARGEST_WHOLE = 2**63 - 1
 _SHOWN_NUMBERS = 16
 _short = reprlib.Repr()
 _short.maxstring = _short.maxother = 160
@@ -85,27 +90,39 @@ def _converted(quantity, target, name):
 
 
 def finite_number(value: Scalar, target: unit.Unit, name: str) -> float:
-    """Return ``value`` as a float in ``target``; raise InputError unless it is one number."""
+    """Return ``value`` as a float in ``target``; raise InputError unless it is one number that can be computed with."""
+    return _of_size(_single_number(value, target, name), name)
+
+
+def positive(value: Scalar, target: unit.Unit, name: str) -> float:
+    """Return ``value`` as a float in ``target``; raise InputError unless it is one number above zero."""
+    converted = _single_number(value, target, name)
+    if converted <= 0:
+        raise InputError(f"{name} must be positive, but is {converted:g}.")
+    return _of_size(converted, name)
+
+
+def non_negative(value: Scalar, target: unit.Unit, name: str) -> float:
+    """Return ``value`` as a float in ``target``; raise InputError if it is negative or not one number."""
+    converted = _single_number(value, target, name)
+    if converted < 0:
+        raise InputError(f"{name} cannot be negative, but is {converted:g}.")
+    return _of_size(converted, name)
+
+
+def _single_number(value, target, name):
     converted = in_units_of(value, target, name)
     if not isinstance(converted, float):
         raise InputError(f"{name} must be a single number, but has the shape {converted.shape}.")
     return converted
 
 
-def positive(value: Scalar, target: unit.Unit, name: str) -> float:
-    """Return ``value`` as a float in ``target``; raise InputError unless it is one number above zero."""
-    converted = finite_number(value, target, name)
-    if converted <= 0:
-        raise InputError(f"{name} must be positive, but is {converted:g}.")
-    return converted
-
-
-def non_negative(value: Scalar, target: unit.Unit, name: str) -> float:
-    """Return ``value`` as a float in ``target``; raise InputError if it is negative or not one number."""
-    converted = finite_number(value, target, name)
-    if converted < 0:
-        raise InputError(f"{name} cannot be negative, but is {converted:g}.")
-    return converted
+def _of_size(number, name):
+    if number != 0.0 and not 1.0 / _LARGEST <= abs(number) <= _LARGEST:
+        raise InputError(
+            f"{name} must be between {1.0 / _LARGEST:g} and {_LARGEST:g} in OpenMM's units, but is {number:g}."
+        )
+    return number
 
 
 def whole_number(value: Any, minimum: int, name: str) -> int:
@@ -114,8 +131,37 @@ def whole_number(value: Any, minimum: int, name: str) -> int:
         if not (isinstance(value, float) and math.isfinite(value) and value == int(value)):
             raise InputError(f"{name} must be a whole number, but is {shown(value)}.")
     if value < minimum:
-        raise InputError(f"{name} must be at least {minimum}, but is {value}.")
+        raise InputError(f"{name} must be at least {minimum}, but is {shown(value)}.")
+    if value > _LARGEST_WHOLE:
+        raise InputError(f"{name} must be at most {_LARGEST_WHOLE}, but is {shown(value)}.")
     return int(value)
+
+
+def whole_numbers(values: Any, minimum: int, name: str) -> list[int]:
+    """Return a sequence of whole numbers as ints; raise InputError for anything else."""
+    if isinstance(values, (str, bytes)) or not isinstance(values, Collection) or getattr(values, "ndim", 1) == 0:
+        raise InputError(f"{name} must be a sequence of whole numbers, but is {shown(values)}.")
+    return [whole_number(value, minimum, f"An entry of {name}") for value in values]
+
+
+def true_or_false(value: Any, name: str) -> bool:
+    """Return ``value`` as a bool; raise InputError if it is none."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name} must be True or False, but is {shown(value)}.")
+    return bool(value)
+
+
+def one_of(value: Any, choices: Iterable[str], name: str) -> str:
+    """Return ``value``; raise InputError unless it is one of a few words."""
+    if not isinstance(value, str) or value not in choices:
+        raise InputError(f"{name} must be one of {', '.join(choices)}, but is {shown(value)}.")
+    return value
+
+
+def require_kind(value: Any, kind: type, name: str) -> None:
+    """Raise InputError unless ``value`` is an object of a class."""
+    if not isinstance(value, kind):
+        raise InputError(f"{name} must be an object of the class {kind.__name__}, but is {shown(value)}.")
 
 
 def vector(value: Vector, target: unit.Unit, name: str) -> FloatArray:

@@ -193,7 +193,7 @@ def test_springs_much_longer_than_the_reach_are_warned_of(energy, share, warned)
     assert all(one.filename == __file__ for one in caught)
 
 
-@pytest.mark.parametrize("spacing", [1e-7, 1e-300])
+@pytest.mark.parametrize("spacing", [1e-7, 1e-30])
 def test_sites_that_cannot_be_told_apart_are_refused(spacing):
     kind = Crosslinker(hands=replace(HAND, site_spacing=spacing), stiffness=0.1)
     with pytest.raises(openmm.OpenMMException, match="Chain 0 would have more than a thousand million sites of hand 0"):
@@ -233,8 +233,8 @@ def test_what_a_system_cannot_hold_is_refused():
     _, system, positions = filaments.build()
     with pytest.raises(InputError, match="already in a System"):
         filaments.add_linkers(SPRING, count=1)
-    with pytest.raises(openmm.OpenMMException, match="need a volume or a concentration"):
-        new_context(system, positions, filaments.create_integrator(system, 1e6, checks=False))
+    with pytest.raises(InputError, match="Linkers 'crosslinker' need a volume or a concentration"):
+        filaments.create_integrator(system, 1e6, checks=False)
 
 
 def test_a_box_that_has_become_too_narrow_for_a_reach_is_refused():

@@ -166,6 +166,10 @@ def test_intervals_may_carry_rounding_errors():
     ("parts", "fragments"),
     [
         ({"top": "x\n"}, ["not valid TOML", "line 1"]),
+        ({"top": "title = 'a'\ntitle = 'b'\n"}, ["line 2: the key 'title' has come before in the same table"]),
+        ({"solvent": SOLVENT + SOLVENT}, ["line 4: [solvent] has come before: give a table once"]),
+        ({"filament": FILAMENT + FILAMENT.replace("[[filament]]", "[filament]")}, ["[filament] has come before"]),
+        ({"top": "a = { b = 1, b = 2 }\n"}, ["line 1: the key 'b' stands twice between the same braces"]),
         ({"top": "temperature = 310\n"}, ["unknown key 'temperature'", "belongs to [solvent]"]),
         ({"solvent": SOLVENT.replace("solvent", "solvents")}, ["unknown key 'solvents'", "Did you mean 'solvent'"]),
         ({"solvent": ""}, ["[solvent]", "lacks the key 'temperature'", '"310 K"']),

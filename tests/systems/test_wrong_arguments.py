@@ -4,21 +4,47 @@ import dataclasses
 import re
 
 import numpy as np
+import openmm
 import pytest
-from openmm import unit
+from openmm import app, unit
 
 from openmm_cylchain import (
+    DSDNA_BASE_PAIRS,
     F_ACTIN,
+    Box,
+    ConstantVelocityPulling,
+    Crosslinker,
     CrosslinkReporter,
     Crosslinks,
     CrosslinkTable,
     FilamentReporter,
     Filaments,
     FilamentType,
+    Hand,
     InputError,
+    Joints,
     LinkerReporter,
+    LinkerTable,
+    Sphere,
     TensionReporter,
     TetherReporter,
+    capsule_contact_force,
+    constant_force,
+    constant_tension,
+    contact_force,
+    contact_forces,
+    crossing_barrier,
+    effective_rate,
+    excluded_pairs,
+    filament_wall_force,
+    random_points_on,
+    recommended_time_step,
+    share_exclusions,
+    theory,
+    time_step_bounds,
+    wall_force,
+    wall_forces,
+    write_psf,
 )
 
 
@@ -135,8 +161,8 @@ def test_tables_of_crosslinks(name, value, message):
 @pytest.mark.parametrize("name", ["bending_rigidity", "segment_length", "diameter", "mass_per_length"])
 @pytest.mark.parametrize("value", [1e308, 1e-300])
 def test_filament_types_beyond_all_measure(name, value):
-    message = f"{name} must be between 1e-30 and 1e+30 in OpenMM's units, but is {value:g}."
-    with pytest.raises(InputError, match=re.escape(message)):
+    message = rf"{name}.* must be between 1e-[36]0 and 1e\+[36]0 in OpenMM's units, but is {re.escape(f'{value:g}')}\."
+    with pytest.raises(InputError, match=message):
         dataclasses.replace(F_ACTIN, **{name: value})
 
 
@@ -146,3 +172,96 @@ def test_a_filament_type_without_mass():
     assert FilamentType(
         name="X", diameter=7.0, segment_length=100.0, bending_rigidity=0.0, stretching_modulus=1e3
     ).mass_per_length == pytest.approx(3500.0)
+
+
+RATES = {"binding_rate": 1e-11, "reach": 60.0, "unbinding_rate": 1e-12}
+HAND = Hand(**RATES)
+LINKER = Crosslinker(hands=HAND, stiffness=0.1)
+
+
+def _new():
+    filaments = Filaments(602.0, 300.0, engine="compiled")
+    for y in (0.0, 500.0):
+        filaments.add_straight(F_ACTIN, 3, (0, y, 0), (1, 0, 0))
+    return filaments
+
+
+def _built():
+    filaments = _new()
+    return filaments, filaments.build()[1]
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (
+            lambda f, s: Filaments(602.0, 300.0).add_straight(F_ACTIN, 10**400, (0, 0, 0), (1, 0, 0)),
+            "segments must be at most",
+        ),
+        (
+            lambda f, s: Filaments(602.0, 300.0).add_nodes(F_ACTIN, np.eye(3), closed=np.array([])),
+            "closed must be True or False",
+        ),
+        (
+            lambda f, s: Filaments(602.0, 300.0).add_linkers(LINKER, 5, seed=1 * unit.nanometer),
+            "seed must be a whole number",
+        ),
+        (lambda f, s: _new().add_linkers(LINKER, 5, seed=-1), "seed must be at least 0"),
+        (lambda f, s: f.create_integrator(None, 1.0), "system must be an object of the class System"),
+        (lambda f, s: f.create_integrator(s, 1.0, scheme=np.array([])), "scheme must be one of"),
+        (lambda f, s: f.create_integrator(s, 1.0, precision=np.array([])), "precision must be one of"),
+        (lambda f, s: f.create_integrator(s, 1.0, checks=None), "checks must be True or False"),
+        (lambda f, s: f.create_integrator(s, 1e-300), "must be between 1e-60 and"),
+        (lambda f, s: f.chain_set(openmm.System()), "too few particles"),
+        (lambda f, s: f.in_context(None), "context must be an object of the class Context"),
+        (lambda f, s: _new().add_to(None, s, np.zeros((8, 3))), "topology must be a Topology"),
+        (lambda f, s: Hand(**RATES, at_end=np.array([])), "at_end must be one of release"),
+        (lambda f, s: HAND.binds(None), "filament_type must be an object"),
+        (lambda f, s: Crosslinker(hands=HAND, stiffness=1.0, name=None), "name must be an object of the class str"),
+        (lambda f, s: Crosslinker(hands=HAND, stiffness=1.0, same_filament=2), "same_filament must be True or False"),
+        (lambda f, s: LINKER.energy_at_reach(None, 300.0), "hand must be an object of the class Hand"),
+        (lambda f, s: Sphere((0, 0, 0), 1.0).square_depth([1, [2]]), "positions must be a number or an array"),
+        (lambda f, s: Box((0, 0, 0), (1, 1, 1)).square_depth([1, 2]), "positions must have the shape"),
+        (lambda f, s: random_points_on(Sphere((0, 0, 0), 1.0), 10**9), "count must be at most 1e"),
+        (lambda f, s: random_points_on(Sphere((0, 0, 0), 1.0), 3, -1), "seed must be at least 0"),
+        (lambda f, s: Crosslinks(1.0, 1.0).add(None, 0, [1, [2]]), "A place must be a particle"),
+        (lambda f, s: Crosslinks(1.0, 1.0).remove(None, [1, [2]]), "must be a whole number"),
+        (lambda f, s: Crosslinks(1.0, 1.0).remove(None, 2**40), "numbers are below"),
+        (lambda f, s: Crosslinks(1.0, 1.0).add_to(None), "system must be an object of the class System"),
+        (lambda f, s: Crosslinks(1.0, 1.0).add_to(s, periodic="no"), "periodic must be True or False"),
+        (lambda f, s: CrosslinkTable(**{**COLUMNS, "pairs": 1}), "pairs of a table of crosslinks must be an array"),
+        (lambda f, s: CrosslinkTable(**COLUMNS, active=3), "active of a table of crosslinks must be"),
+        (lambda f, s: CrosslinkTable(**{**COLUMNS, "numbers": [10**400]}), "must be an array of numbers"),
+        (lambda f, s: Joints(1.0).add_to(None), "system must be an object of the class System"),
+        (lambda f, s: LinkerTable(None, [], [], [], [], 0), "LinkerTable: numbers must be"),
+        (lambda f, s: LinkerTable([0.5], [0], [-1], [[-1, -1]], [[0, 0]], 1), "LinkerTable: numbers must be whole"),
+        (lambda f, s: LinkerTable([0], [0], [-1], [[-1, -1]], [[0, 0]], np.nan), "next_number must be a whole number"),
+        (lambda f, s: constant_force(None, (1, 0, 0)), "particles must be a sequence of whole numbers"),
+        (lambda f, s: constant_tension("abc", 1.0, (1, 0, 0)), "must be a Filaments object"),
+        (lambda f, s: constant_tension(f, 1.0, (1, 0, 0), 1.5), "numbers must be a sequence of whole numbers"),
+        (lambda f, s: ConstantVelocityPulling(None, 1, None, 0, (1, 0, 0)), "must be a Filaments object"),
+        (lambda f, s: capsule_contact_force(None, s, 10.0), "must be a Filaments object"),
+        (lambda f, s: capsule_contact_force(f, None, 10.0), "system must be an object of the class System"),
+        (lambda f, s: contact_force(None, s, 10.0), "must be a Filaments object"),
+        (lambda f, s: excluded_pairs("", 1.0), "must be a Filaments object"),
+        (lambda f, s: share_exclusions(None), "system must be an object of the class System"),
+        (lambda f, s: wall_force(Sphere((0, 0, 0), 1.0), 1.0, "abc"), "particles must be a sequence of whole numbers"),
+        (lambda f, s: filament_wall_force(None, s, Sphere((0, 0, 0), 99.0), 1.0), "must be a Filaments object"),
+        (lambda f, s: wall_forces(None), "context must be an object of the class Context"),
+        (lambda f, s: contact_forces(None), "context must be an object of the class Context"),
+        (lambda f, s: crossing_barrier(1e30, 1.0, 1.0), "spacing is 1 nm, which is too small"),
+        (lambda f, s: effective_rate(1.0, "implicit", 0.0), "rate must be positive"),
+        (lambda f, s: effective_rate(1.0, "implicit", [1.0]), "rate must be a single number"),
+        (lambda f, s: time_step_bounds(F_ACTIN, 602.0, 300.0, confidence=0.0), "confidence must be positive"),
+        (lambda f, s: recommended_time_step(None, 602.0, 300.0), "filament_type must be an object"),
+        (lambda f, s: recommended_time_step(F_ACTIN, 602.0, 300.0, flow=3), "flow must be a Flow"),
+        (lambda f, s: recommended_time_step(F_ACTIN, 602.0, 300.0, friction=3), "friction must be an object"),
+        (lambda f, s: theory.bending_energy_mean(None, 300.0), "filament_type must be an object"),
+        (lambda f, s: theory.bead_spring_mean_lengths(DSDNA_BASE_PAIRS, 10**10, 300.0), "bonds must be at most"),
+        (lambda f, s: theory.bead_spring_mean_lengths(DSDNA_BASE_PAIRS, 4, 300.0, None), "planar must be True or"),
+        (lambda f, s: write_psf(app.Topology(), "none.psf", system=3), "system must be an object of the class System"),
+    ],
+)
+def test_wrong_calls_are_refused_in_words(call, message):
+    with pytest.raises(InputError, match=message):
+        call(*_built())

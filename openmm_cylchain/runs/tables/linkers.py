@@ -267,5 +267,7 @@ def _random_anchors(entries, seed, box, walls):
         raise entries.at("upper").error("must not be below lower.")
     if wall is None:
         return np.random.default_rng(seed).uniform(lower, upper, (entries["count"], 3))
-    with entries.naming():
+    try:
         return random_points_on(walls[wall - 1].shape, entries["count"], seed, lower, upper)
+    except InputError as error:
+        raise entries.error(f"at random places: {error}") from None
