@@ -5,7 +5,16 @@ from typing import TypedDict
 import numpy as np
 
 from ..errors import InputError
-from ..units.quantities import FORCE, LENGTH, finite_number, in_units_of, shown, unit_vector, vector, whole_number
+from ..units.quantities import (
+    FORCE,
+    LENGTH,
+    finite_number,
+    in_units_of,
+    true_or_false,
+    unit_vector,
+    vector,
+    whole_number,
+)
 from ..units.types import Indices, Scalar, Vector, Vectors
 from .chain_type import ChainType, Points
 from .filament import Filament
@@ -159,9 +168,3 @@ def new_filament(
             control_points = both[len(positions) :]
     held, held_tangents = filament_type.segment_kind.clamps(clamped, clamped_tangents, len(positions), label)
     return Filament(filament_type, positions, held, closed, planar, propulsion, control_points, held_tangents)
-
-
-def true_or_false(value, name):
-    if not isinstance(value, (bool, np.bool_)):
-        raise InputError(f"{name} must be True or False, but is {shown(value)}.")
-    return bool(value)
