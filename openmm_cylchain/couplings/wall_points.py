@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from ..errors import InputError
-from ..units.quantities import LENGTH, vector, whole_number
+from ..units.quantities import LENGTH, vector, whole_number, whole_numbers
 from ..units.types import FloatArray, Vector
 from .shapes import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
 
@@ -21,7 +22,7 @@ _ROUNDING = 1e-9
 
 
 def random_points_on(
-    wall: Shape, count: int, seed: int = 0, lower: Vector | None = None, upper: Vector | None = None
+    wall: Shape, count: int, seed: int | Sequence[int] = 0, lower: Vector | None = None, upper: Vector | None = None
 ) -> FloatArray:
     """Points at random on a wall, with the same chance for each area: an array (count, 3) in nm.
 
@@ -29,7 +30,7 @@ def random_points_on(
     ----------
     wall : Plane, Slab, Sphere, Cylinder, Box or Ellipsoid
     count : int
-    seed : int
+    seed : int, or several
     lower, upper : (3,) length, optional
         Opposite corners of a box along the axes of space: points are on what it holds of the wall. Planes, slabs and
         cylinders, which have no end, need both.
@@ -53,7 +54,8 @@ def random_points_on(
     high = np.full(3, np.inf) if upper is None else vector(upper, LENGTH, "upper")
     if np.any(low > high):
         raise InputError(f"lower must not be above upper, but they are {low.tolist()} and {high.tolist()} nm.")
-    generator = np.random.default_rng(whole_number(seed, 0, "seed"))
+    seeds = whole_numbers(seed, 0, "seed") if isinstance(seed, Sequence) else whole_number(seed, 0, "seed")
+    generator = np.random.default_rng(seeds)
     draw = _SAMPLERS[type(wall)]
     slack = _ROUNDING * max(np.abs(corner[np.isfinite(corner)]).max(initial=0.0) for corner in (low, high))
     found, drawn = np.zeros((0, 3)), 0

@@ -264,7 +264,7 @@ def _later(values):
 def _load(folder, data):
     """The slope of the bending energy over the shortening in pN: the engine's, with its error, and the elastica's."""
     finished = analysis.load(folder)
-    energies = finished.energies["bending energy (kJ/mol)"] / len(finished.filaments) / _PICONEWTON
+    energies = finished.energies["bending energy (pN nm)"] / len(finished.filaments)
     shortenings, exact = _later_elastica(data)
     line, covariance = np.polyfit(shortenings, energies[_FIRST:], 1, cov=True)
     theory = np.polyfit(shortenings, [own.energy for own in exact], 1)[0]

@@ -69,7 +69,7 @@ def test_tables_have_means_between_reports(unbroken):
 
 def test_a_run_that_is_resumed_between_reports_has_the_same_tables(unbroken, tmp_path, monkeypatch):
     """A signal comes at 50 us, half-way between two reports: the next mean is that over all steps between them."""
-    take = run_module._Recorder._timed_steps
+    take = run_module.Recorder._timed_steps
 
     def signalled(recorder, steps):
         result = take(recorder, min(steps, 50 - recorder._step))
@@ -79,10 +79,10 @@ def test_a_run_that_is_resumed_between_reports_has_the_same_tables(unbroken, tmp
 
     (tmp_path / "input.toml").write_text(BETWEEN_WALLS)
     command = ["run", str(tmp_path / "input.toml"), "--output", str(tmp_path / "out")]
-    monkeypatch.setattr(run_module._Recorder, "_timed_steps", signalled)
+    monkeypatch.setattr(run_module.Recorder, "_timed_steps", signalled)
     assert main(command) == 130
     assert len((tmp_path / "out" / TABLES[0]).read_text().splitlines()) == 1 + 2 * 3
-    monkeypatch.setattr(run_module._Recorder, "_timed_steps", take)
+    monkeypatch.setattr(run_module.Recorder, "_timed_steps", take)
     assert main([*command, "--resume"]) == 0
     for name in TABLES:
         assert (tmp_path / "out" / name).read_text() == (unbroken / name).read_text(), name
@@ -114,7 +114,7 @@ def test_the_figure_has_panels_of_forces(unbroken, monkeypatch):
     monkeypatch.setattr(summary_figure.Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
     configuration = parse_configuration(BETWEEN_WALLS)
     files = RunDirectory(unbroken)
-    summary_figure._draw(configuration, files, load_trajectory(configuration, files))
+    summary_figure._draw(configuration, files, load_trajectory(configuration, files), None)
     walls, contacts = drawn[0].axes[-2:]
     assert walls.get_title() == "Forces of walls, by faces"
     assert [line.get_label() for line in walls.lines] == ["wall 0, slit, upper face", "wall 0, slit, lower face"]

@@ -95,7 +95,7 @@ def test_the_same_from_python(pulled):
 
 
 def test_a_resumed_run_is_the_same(pulled, tmp_path, monkeypatch):
-    written = run_module._Recorder._write_checkpoint
+    written = run_module.Recorder._write_checkpoint
     count = 0
 
     def stopped(recorder):
@@ -108,10 +108,10 @@ def test_a_resumed_run_is_the_same(pulled, tmp_path, monkeypatch):
 
     (tmp_path / "input.toml").write_text(PULLED)
     command = ["run", str(tmp_path / "input.toml"), "--output", str(tmp_path / "out")]
-    monkeypatch.setattr(run_module._Recorder, "_write_checkpoint", stopped)
+    monkeypatch.setattr(run_module.Recorder, "_write_checkpoint", stopped)
     with pytest.raises(KeyboardInterrupt):
         raise_from(command)
-    monkeypatch.setattr(run_module._Recorder, "_write_checkpoint", written)
+    monkeypatch.setattr(run_module.Recorder, "_write_checkpoint", written)
     assert main([*command, "--resume"]) == 0
     for name in ("pulling.csv", "energies.csv"):
         assert (tmp_path / "out" / name).read_text() == (pulled / name).read_text()
@@ -130,7 +130,7 @@ def raise_from(command):
     [
         ('["400 um/s", "300 um/s", "0 um/s"]', '["0 um/s", "0 um/s", "0 um/s"]', "velocity is zero: leave it out"),
         ('velocity = ["400 um/s", "300 um/s", "0 um/s"]\n', "", "lacks the key 'velocity'"),
-        ('"400 um/s"', '"400 um"', "unit µm, which is not one of velocity"),
+        ('"400 um/s"', '"400 um"', "unit um, which is not one of velocity"),
         ('start_time = "2 us"', 'start_time = "-2 us"', "start_time"),
     ],
 )
