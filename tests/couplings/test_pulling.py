@@ -346,8 +346,8 @@ def test_bad_input_is_refused():
         (([0], [[1, 2, 3], [1, 2, 3]]), r"\(3,\) or \(1, 3\), but have \(2, 3\)"),
         (([0], [1, 2, np.nan]), "forces must be finite"),
         (([0], [1, 2, 3] * unit.nanometer), "forces has the unit"),
-        (([-1], [1, 2, 3]), "particle must be at least 0"),
-        (([0.5], [1, 2, 3]), "particle must be a whole number"),
+        (([-1], [1, 2, 3]), "An entry of particles must be at least 0"),
+        (([0.5], [1, 2, 3]), "An entry of particles must be a whole number"),
     ):
         with pytest.raises(InputError, match=message):
             constant_force(*arguments)

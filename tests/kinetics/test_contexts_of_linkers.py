@@ -163,7 +163,7 @@ def test_reaches_that_are_tiny_bind_hardly_anything():
     assert filaments.in_context(context).linkers().counts()[2] == 0
 
 
-@pytest.mark.parametrize("speed", [1e300, -1e300])
+@pytest.mark.parametrize("speed", [1e60, -1e60])
 def test_hands_of_any_speed_come_to_an_end_or_an_error(speed):
     hand = replace(HAND, unbinding_rate=0.0, speed=speed, at_end="hold")
     filaments = shapes("open")

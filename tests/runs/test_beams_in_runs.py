@@ -256,7 +256,7 @@ def test_dry_run_names_beam_elements(tmp_path, capsys):
     assert main(["run", str(tmp_path / "input.toml"), "--dry-run"]) == 0
     text = capsys.readouterr().out
     assert "2 × BEAM, 3 beam elements" in text and "1 × ACT, 2 segments" in text and "1 × ACT, 2 beam elements" in text
-    assert f"{ELEMENTS + STRAIGHT} segments, {PARTICLES} particles" in text and "1 links" in text
+    assert f"{ELEMENTS + STRAIGHT} segments, {PARTICLES} particles" in text and "1 link" in text
 
 
 def test_timestep_explains_that_of_beam_elements(tmp_path, capsys):

@@ -131,7 +131,7 @@ def test_runs_have_joints_that_hold(tmp_path, capsys):
     joint = JOINT.replace("400 kJ/mol", "1e5 kJ/mol")
     (tmp_path / "dry.toml").write_text(with_joint(joint))
     assert main(["run", str(tmp_path / "dry.toml"), "--dry-run"]) == 0
-    assert "1 joints" in capsys.readouterr().out
+    assert "1 joint\n" in capsys.readouterr().out
     directory = simulated(tmp_path, with_joint(joint))
     assert "joints hold their directions" in capsys.readouterr().out
     run = analysis.load(directory)
