@@ -22,6 +22,9 @@ from .planar_crossings import find_planar_crossing
 CAPSULE_BARRIER = 40.0
 """Energy of two capsules whose axes meet in k_B T, with the stiffness that ``default_capsule_stiffness`` gives."""
 
+_SMALLEST, _LARGEST = 1e-6, 1e6
+"""Of diameters in nm."""
+
 _LEAST_PIECES = 4
 _DEEPEST_BOW = 0.1
 
@@ -32,10 +35,13 @@ _EXCLUDED_DIAMETERS = 2.0
 def default_capsule_stiffness(diameter: Scalar, temperature: Scalar) -> float:
     """Stiffness of a contact that two filaments cross for 40 k_B T: k = 80 k_B T/d^2, in kJ/(mol nm^2)."""
     diameter = positive(diameter, LENGTH, "diameter")
-    square = diameter * diameter
-    if not 0.0 < square < math.inf:
+    _refuse_size(diameter)
+    return 2.0 * CAPSULE_BARRIER * thermal_energy(temperature) / diameter**2
+
+
+def _refuse_size(diameter):
+    if not _SMALLEST <= diameter <= _LARGEST:
         raise InputError(f"A contact diameter of {diameter:g} nm is none of filaments: check its unit.")
-    return 2.0 * CAPSULE_BARRIER * thermal_energy(temperature) / square
 
 
 def contact_spacing(filament_type: ChainType, diameter: Scalar, temperature: Scalar) -> float:
@@ -127,6 +133,8 @@ def capsule_contact_force(
     diameters = filament_diameters(diameter, len(filaments))
     spheres = outside_particles(filaments, system, particles)
     sphere_diameters = particle_diameters(particles, particle_diameter)
+    for own in (*diameters, *sphere_diameters):
+        _refuse_size(own)
     if not len(diameters):
         raise InputError("There are no filaments that could touch.")
     _require_beads(filaments, diameters)

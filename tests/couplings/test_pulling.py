@@ -358,7 +358,7 @@ def test_bad_input_is_refused():
         ((np.inf, [1, 0, 0]), "tension must be finite"),
         ((1 * unit.kelvin, [1, 0, 0]), "tension has the unit"),
         ((1, [1, 0, 0], [2]), "Filament 2 does not exist; there are 2"),
-        ((1, [1, 0, 0], [-1]), "filament must be at least 0"),
+        ((1, [1, 0, 0], [-1]), "An entry of numbers must be at least 0"),
     ):
         with pytest.raises(InputError, match=message):
             constant_tension(filaments, *arguments)
