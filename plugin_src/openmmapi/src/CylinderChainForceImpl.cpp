@@ -35,8 +35,8 @@ void CylinderChainForceImpl::initialize(ContextImpl& context) {
 void CylinderChainForceImpl::updateContextState(ContextImpl& context, bool&) {
     if (planar == -1 || dynamic_cast<const CylinderChainIntegrator*>(&context.getIntegrator()) != NULL)
         return;
-    throw OpenMMException("CylinderChainForce: "+description->getList().getName(planar)+" is planar, but this Integrator "
-            "would take it out of its plane: use a CylinderChainIntegrator");
+    throw OpenMMException("CylinderChainForce: "+description->getList().getName(planar)+" is planar, but this "
+            "Integrator would take it out of its plane: use a CylinderChainIntegrator");
 }
 
 double CylinderChainForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy,
