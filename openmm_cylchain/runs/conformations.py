@@ -57,10 +57,9 @@ class Conformations:
             segments = np.concatenate([np.stack([own[:-1, :2], own[1:, :2]], axis=1) for own in lines])
             label = None if group.table in tables else self._label(group)
             self._draw_segments(axis, segments, tables.setdefault(group.table, colour), 1.8, 2, label)
-            ends += [] if group.closed else [(own[-1, :2], colour) for own in lines]
+            ends += [] if group.closed else [own[-1, :2] for own in lines]
         if self._polar and ends:
-            places = np.array([place for place, _ in ends])
-            places = places if self._box is None else np.mod(places, self._box)
+            places = np.array(ends) if self._box is None else np.mod(ends, self._box)
             axis.plot(*places.T, "o", color="black", markersize=3.5, zorder=3, label=_PLUS_END)
         step = self._records["step"] == frame % len(self._trajectory) * self._steps
         for number, (label, colour) in enumerate(self._springs):

@@ -13,7 +13,7 @@ from openmm_cylchain.export.simularium import write_simularium
 from openmm_cylchain.output.files import write_atomically
 from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.run import run
-from openmm_cylchain.units.quantities import thermal_energy
+from openmm_cylchain.units.quantities import PICONEWTON, thermal_energy
 
 from . import compressed_shapes, simulation, style
 from .case import Case, Outcome
@@ -33,8 +33,6 @@ _RIGIDITY = 4.1e4
 _TEMPERATURE = 304.2
 """At which k_B T is the 4.2 pN nm of Cytosim."""
 _SEGMENTS = 50
-_PICONEWTON = 0.602214076
-"""In kJ/(mol nm)."""
 _KEYS = {4.7: "0047", 15.0: "0150", 47.0: "0470", 150.0: "1500"}
 _DURATIONS = {4.7: 31685.0, 15.0: 10000.0, 47.0: 3162.0, 150.0: 1000.0}
 """In us, by the name of the velocity in um/s: 150 nm over these."""
@@ -278,7 +276,7 @@ def _their_energy(own):
 
 
 def _results(velocity, data, theirs, folder):
-    at, thermal = f"at_{velocity:g}_um/s", _THERMAL_UNITS * thermal_energy(_TEMPERATURE) / _PICONEWTON
+    at, thermal = f"at_{velocity:g}_um/s", _THERMAL_UNITS * thermal_energy(_TEMPERATURE) / PICONEWTON
     _, exact = _later_elastica(data)
     load, exact_load = _load(folder, data)
     cytosim = {name: Printed(theirs[name], theirs[f"{name}_error"]) for name in _PUBLISHED_COLUMNS}
@@ -342,7 +340,7 @@ def _draw(figure, runs, theirs):
         "average_perp_distance": [own.average_distance(_POINTS) for own in elastica],
         "energy": [own.energy for own in elastica],
     }
-    thermal = _THERMAL_UNITS * thermal_energy(_TEMPERATURE) / _PICONEWTON
+    thermal = _THERMAL_UNITS * thermal_energy(_TEMPERATURE) / PICONEWTON
     markers = {"cytosim": ("o", "#D55E00", "Cytosim"), "readdy": ("^", "#009E73", "ReaDDy")}
     for row, (name, label) in enumerate(rows.items()):
         for column, (velocity, data) in enumerate(runs.items()):
@@ -380,7 +378,7 @@ def _relaxation_time():
     own, solvent = configuration.filaments[0].type, configuration.solvent
     friction = own.segment_friction(solvent.viscosity, solvent.temperature, _SEGMENTS).perpendicular
     length = _LENGTH - 2.0 * _HELD
-    return friction * _SEGMENTS / _LENGTH * (length / 4.730) ** 4 / (_RIGIDITY * _PICONEWTON) * 1e-6
+    return friction * _SEGMENTS / _LENGTH * (length / 4.730) ** 4 / (_RIGIDITY * PICONEWTON) * 1e-6
 
 
 def evaluate(records, quick):

@@ -124,22 +124,25 @@ void CylinderChainContactForceImpl::refuseChains(const CylinderChainDescription&
 void CylinderChainContactForceImpl::refuseBox(ContextImpl& context, const CylinderChainDescription& chains) const {
     if (!periodic)
         return;
-    // How long the segment is that begins at a particle.
+    // How long the longest segment at each particle is, whichever end of it is there.
 
     map<int, double> lengths;
+    auto note = [&] (int first, int second, double length) {
+        for (int particle : {first, second})
+            lengths[particle] = max(lengths[particle], length);
+    };
     double longestElement = 0;
     for (const Chain& chain : chains.getChains())
         for (size_t i = 0; i < chain.segments.size(); i++)
-            lengths[chain.nodes[i]] = chain.segments[i].restLength;
+            note(chain.nodes[i], chain.nodes[(i+1)%chain.nodes.size()], chain.segments[i].restLength);
     for (const BeamChain& beam : chains.getBeams())
         longestElement = max(longestElement, beam.elementLength);
     const vector<Capsule>& capsules = search->getSystem().capsules;
     for (const CapsuleOnCurve& own : onCurves)
-        lengths[capsules[own.capsule].first] = longestElement/own.pieces;
+        note(capsules[own.capsule].first, capsules[own.capsule].second, longestElement/own.pieces);
     double size = 0, length = 0, diameter = 0;
     for (const Capsule& capsule : capsules) {
-        const auto found = capsule.second < 0 ? lengths.end() : lengths.find(capsule.first);
-        const double own = found == lengths.end() ? 0 : found->second;
+        const double own = capsule.second < 0 ? 0 : min(lengths[capsule.first], lengths[capsule.second]);
         if (own+DIAMETERS_OF_BOX*2*capsule.radius <= size)
             continue;
         size = own+DIAMETERS_OF_BOX*2*capsule.radius;
