@@ -34,6 +34,8 @@ struct Tether {
 struct Chain {
     /** Particle of each node. */
     std::vector<int> nodes;
+    /** Particles of a chain that grows which are no nodes now, but may become some: they are where the last node is. */
+    std::vector<int> spareNodes;
     /** One less than nodes; as many as nodes if the chain is closed. */
     std::vector<Segment> segments;
     /**

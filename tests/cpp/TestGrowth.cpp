@@ -1,0 +1,519 @@
+/**
+ * This tests chains that grow while they stand still: how monomers are divided into segments, rates and equilibrium of
+ * free ends, a rod that grows against a wall, a pool that runs dry, and the energies of contacts at ends.
+ */
+
+#include "TestChains.h"
+#include "couplings/ContactBodies.h"
+#include "growth/ChainGrowth.h"
+#include "growth/EndContacts.h"
+#include "growth/EndWalls.h"
+#include <map>
+#include <numeric>
+
+static const int PER_SEGMENT = 12;
+static const double MONOMER = 2, KT = 2.5;
+
+/** What is soft enough to show: lengths fluctuate by 4 %, and joints bend by 0.5. */
+static MonomerTable makeTable(bool fene, double softness = 1) {
+    MonomerTable table;
+    table.monomersPerSegment = PER_SEGMENT;
+    for (int m = 1; m <= 2*PER_SEGMENT; m++) {
+        const double length = MONOMER*m;
+        table.segments.push_back({length, 60/softness/length, fene ? 0.3*length : 0, 1, 2, 10, 10});
+    }
+    for (int both = 2; both <= 3*PER_SEGMENT; both++)
+        table.joints.push_back(8*KT*2*PER_SEGMENT/both/softness);
+    return table;
+}
+
+static void testDivision() {
+    for (int perSegment : {2, 3, 7, 12})
+        for (int first = -30; first < 30; first++)
+            for (int last = first+1; last < first+5*perSegment; last++) {
+                const SegmentDivision division({first, last}, perSegment), longer({first, last+1}, perSegment);
+                const int count = division.countSegments(), least = perSegment/2;
+                int sum = 0;
+                for (int s = 0; s < count; s++) {
+                    const int monomers = division.getMonomers(s);
+                    sum += monomers;
+                    check(count == 1 ? monomers < 2*perSegment : monomers >= least && monomers < least+perSegment &&
+                            (s == 0 || s == count-1 || monomers == perSegment), "the monomers of a segment");
+                    check(s >= count-1 || monomers == longer.getMonomers(s) || longer.countSegments() > count,
+                            "what growth changes");
+                    check(division.getMonomersFrom(1, count-1-s) == monomers && division.getMonomersFrom(0, s) ==
+                            monomers, "the monomers from an end");
+                }
+                check(sum == last-first, "all monomers");
+            }
+}
+
+/** A number drawn by a density on a grid. */
+template <class Density> static double drawFrom(Density density, double from, double to, mt19937_64& generator) {
+    const int count = 1000;
+    static thread_local vector<double> sums;
+    sums.assign(1, 0);
+    for (int i = 0; i < count; i++)
+        sums.push_back(sums.back()+density(from+(i+0.5)*(to-from)/count));
+    const double chosen = uniform_real_distribution<double>(0, sums.back())(generator);
+    const int i = upper_bound(sums.begin(), sums.end(), chosen)-sums.begin()-1;
+    return from+(i+(chosen-sums[i])/(sums[i+1]-sums[i]))*(to-from)/count;
+}
+
+static double bendingByHand(BendingModel model, double stiffness, double angle) {
+    const double length = bendByHand(model, min(fabs(angle), M_PI-1e-6)).length;
+    return 0.5*stiffness*length*length;
+}
+
+static double stretchingByHand(const Segment& segment, StretchingModel model, double extension) {
+    const double d = segment.maximumExtension;
+    if (model == StretchingModel::Harmonic)
+        return 0.5*segment.stiffness*extension*extension;
+    return fabs(extension) < d ? -0.5*segment.stiffness*d*d*log(1-extension*extension/d/d) : HUGE_VAL;
+}
+
+/** Weights of the angle of a joint and of the extension of a segment, in equilibrium. */
+struct Weights {
+    BendingModel bending;
+    StretchingModel stretching;
+    bool planar;
+    double ofAngle(double stiffness, double angle) const {
+        return (planar ? 1 : sin(angle))*exp(-bendingByHand(bending, stiffness, angle)/KT);
+    }
+    double ofExtension(const Segment& segment, double extension) const {
+        const double length = segment.restLength+extension;
+        return length > 0 ? pow(length, planar ? 1 : 2)*exp(-stretchingByHand(segment, stretching, extension)/KT) : 0;
+    }
+    double meanBending(double stiffness) const {
+        double sum = 0, norm = 0;
+        for (double angle = 5e-5; angle < M_PI; angle += 1e-4) {
+            const double weight = ofAngle(stiffness, angle);
+            sum += weight*bendingByHand(bending, stiffness, angle);
+            norm += weight;
+        }
+        return sum/norm;
+    }
+    double meanStretching(const Segment& segment) const {
+        double sum = 0, norm = 0;
+        const double width = 1e-4*segment.restLength;
+        for (double extension = -segment.restLength; extension < segment.restLength; extension += width) {
+            const double weight = ofExtension(segment, extension);
+            if (weight > 0) {
+                sum += weight*stretchingByHand(segment, stretching, extension);
+                norm += weight;
+            }
+        }
+        return sum/norm;
+    }
+};
+
+/** Chains that grow, where they are and what they have become. */
+struct Growing {
+    ChainList chains;
+    Array x;
+    GrowthSystem system;
+    GrowthState state;
+    vector<BendingModel> bending;
+    vector<StretchingModel> stretching;
+    vector<char> planar;
+    /** Add a chain in equilibrium. */
+    void add(const Weights& weights, MonomerRange range, int particles, const GrowingEnd& minus,
+            const GrowingEnd& plus, mt19937_64& generator, int pool = 0) {
+        const MonomerTable& table = system.tables[0];
+        Chain chain;
+        chain.bending = weights.bending;
+        chain.stretching = weights.stretching;
+        chain.planar = weights.planar;
+        for (int i = 0; i < particles; i++)
+            chain.nodes.push_back(x.size()/3+i);
+        chain.fixed.assign(particles, false);
+        setMonomers(chain, table, range);
+        Vec3d node = {0, 0, 0}, along = {1, 0, 0};
+        auto put = [&] {
+            x.insert(x.end(), {node.x, node.y, node.z});
+        };
+        put();
+        for (size_t s = 0; s < chain.segments.size(); s++) {
+            if (s > 0) {
+                const double stiffness = chain.joints[s-1];
+                const double angle = drawFrom([&] (double a) {return weights.ofAngle(stiffness, fabs(a));},
+                        weights.planar ? -M_PI : 0, M_PI, generator);
+                const double azimuth = uniform_real_distribution<double>(0, 2*M_PI)(generator);
+                const Vec3d first = weights.planar ? Vec3d {-along.y, along.x, 0} :
+                        along.cross(fabs(along.x) < 0.5 ? Vec3d {1, 0, 0} : Vec3d {0, 1, 0});
+                const Vec3d across = first*(1/sqrt(first.squared())), other = along.cross(across);
+                along = along*cos(angle)+(weights.planar ? across : across*cos(azimuth)+other*sin(azimuth))*sin(angle);
+            }
+            const double rest = chain.segments[s].restLength;
+            const double extension = drawFrom([&] (double e) {return weights.ofExtension(chain.segments[s], e);},
+                    -0.6*rest, 0.6*rest, generator);
+            node = node+along*(rest+extension);
+            put();
+        }
+        for (size_t i = 0; i < chain.spareNodes.size(); i++)
+            put();
+        system.chains.push_back({chains.add(chain), 0, pool, 2, {minus, plus}});
+        state.ranges.push_back(range);
+        state.events.resize(2*state.ranges.size());
+        bending.push_back(weights.bending);
+        stretching.push_back(weights.stretching);
+        planar.push_back(weights.planar);
+    }
+    ChainGrowth makeGrowth() const {
+        return ChainGrowth(system, bending, stretching, planar);
+    }
+};
+
+struct Mean {
+    double sum = 0, squares = 0;
+    long long count = 0;
+    void add(double value) {
+        sum += value;
+        squares += value*value;
+        count++;
+    }
+    double mean() const {
+        return sum/count;
+    }
+    double variance() const {
+        return squares/count-mean()*mean();
+    }
+    double error() const {
+        return sqrt(variance()/count);
+    }
+};
+
+static void checkMean(double expected, const Mean& found, double power, const string& what) {
+    check(found.error() < power*fabs(expected)/4, what+": too few samples");
+    checkClose(expected, found.mean(), 4*found.error(), 1, what);
+}
+
+/** Rates, and energies of lengths and bends, of chains that have grown and shrunk, at a step of so many events. */
+static void checkFreeEnds(const Weights& weights, double events) {
+    const int number = 3000;
+    mt19937_64 generator(5);
+    Growing all;
+    all.system.tables = {makeTable(hasRange(weights.stretching))};
+    all.system.pools = {{0.02, 0}};
+    all.state.free = {0};
+    // The plus end gains 3 and loses 2 per time, and the minus end 1 and 2.5.
+    for (int i = 0; i < number; i++)
+        all.add(weights, {-20-i%PER_SEGMENT, 24+i%7}, 14, {50, 2.5}, {150, 2}, generator);
+    ChainGrowth growth = all.makeGrowth();
+    const double time = 8, stepSize = events/8.5;
+    const int steps = max(1.0, round(time/stepSize));
+    vector<int> changed;
+    for (int i = 0; i < steps; i++)
+        check(growth.advance(all.state, {KT, time/steps, 7}, all.chains, all.x.data(), {}, changed) == -1, "a step");
+    Mean plus, minus, plusSquare, bends, lengths;
+    map<double, double> meanBending, meanStretching;
+    auto remember = [] (map<double, double>& known, double key, auto find) {
+        if (known.count(key) == 0)
+            known[key] = find();
+        return known[key];
+    };
+    for (int i = 0; i < number; i++) {
+        const MonomerRange& range = all.state.ranges[i];
+        const double gained = range.last-24-i%7, lost = range.first+20+i%PER_SEGMENT;
+        plus.add(gained);
+        minus.add(lost);
+        plusSquare.add((gained-time)*(gained-time));
+        const Chain& chain = all.chains.getChain(i);
+        Vec3d before = {0, 0, 0};
+        for (size_t s = 0; s < chain.segments.size(); s++) {
+            const double *a = &all.x[3*chain.nodes[s]], *b = &all.x[3*chain.nodes[s+1]];
+            const Vec3d along = {b[0]-a[0], b[1]-a[1], b[2]-a[2]};
+            const double length = sqrt(along.squared());
+            const Segment& segment = chain.segments[s];
+            lengths.add(stretchingByHand(segment, weights.stretching, length-segment.restLength)/
+                    remember(meanStretching, segment.restLength, [&] {return weights.meanStretching(segment);}));
+            if (s > 0) {
+                const double stiffness = chain.joints[s-1];
+                bends.add(bendingByHand(weights.bending, stiffness,
+                        acos(max(-1.0, min(1.0, along.dot(before)/length))))/
+                        remember(meanBending, stiffness, [&] {return weights.meanBending(stiffness);}));
+            }
+            before = along*(1/length);
+            check(!weights.planar || along.z == 0, "a plane");
+        }
+        for (int spare : chain.spareNodes)
+            check(equal(&all.x[3*spare], &all.x[3*spare]+3, &all.x[3*chain.nodes.back()]), "spare nodes at the tip");
+    }
+    check(plus.error() < 0.02*time && minus.error() < 0.02*time, "too few chains");
+    checkClose(time, plus.mean(), 4*plus.error(), 1, "the plus end");
+    checkClose(1.5*time, minus.mean(), 4*minus.error(), 1, "the minus end");
+    checkClose(5*time, plusSquare.mean(), 4*plusSquare.error(), 1, "the variance of the plus end");
+    checkMean(1, bends, 0.08, "the energy of bends");
+    checkMean(1, lengths, 0.08, "the energy of lengths");
+}
+
+static void testFreeEnds() {
+    for (double events : {0.1, 1.0, 10.0})
+        checkFreeEnds({BendingModel::KratkyPorod, StretchingModel::Harmonic, false}, events);
+    checkFreeEnds({BendingModel::Quadratic, StretchingModel::FENE, false}, 3);
+    checkFreeEnds({BendingModel::InscribedCircle, StretchingModel::Harmonic, false}, 3);
+    checkFreeEnds({BendingModel::Quadratic, StretchingModel::Harmonic, true}, 3);
+}
+
+/** One segment that grows against a wall in the direction that it has: the number of its monomers. */
+static void checkRodBeforeWall(double events) {
+    const double distance = 28, stiffness = 5, z = 3;
+    mt19937_64 generator(3);
+    Growing all;
+    all.system.tables = {makeTable(false, 2)};
+    all.system.pools = {{0.01, 0}};
+    const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
+    for (int i = 0; i < 300; i++)
+        all.add(weights, {0, 14}, 2, {}, {100*z, 1}, generator);
+    // They have two segments from 18 monomers on, for which there are no nodes.
+    EndWalls wall({WallShape::Plane, {distance, 0, 0}, {-1, 0, 0}, 0}, stiffness, Array(300, 0.0));
+    ChainGrowth growth = all.makeGrowth();
+    vector<int> changed;
+    vector<double> counts(18), exact(18);
+    const int blocks = 20;
+    vector<Array> ofBlocks(blocks, Array(18));
+    const double stepSize = events/(1+z);
+    const int steps = max(1.0, 4/stepSize);
+    for (int block = -2; block < blocks; block++)
+        for (int sample = 0; sample < 60; sample++) {
+            for (int i = 0; i < steps; i++)
+                growth.advance(all.state, {KT, 4.0/steps, 9}, all.chains, all.x.data(), {&wall}, changed);
+            for (const MonomerRange& range : all.state.ranges)
+                if (block >= 0)
+                    ofBlocks[block][range.size()] += 1;
+        }
+    for (int m = 2; m < 18; m++) {
+        const Segment& segment = all.system.tables[0].getSegment(m);
+        double sum = 0, norm = 0;
+        for (double extension = -segment.restLength; extension < 2*segment.restLength; extension += 1e-3) {
+            const double depth = max(0.0, segment.restLength+extension-distance);
+            const double weight = weights.ofExtension(segment, extension);
+            norm += weight;
+            sum += weight*exp(-0.5*stiffness*depth*depth/KT);
+        }
+        exact[m] = pow(z, m)*sum/norm;
+    }
+    const double total = accumulate(exact.begin(), exact.end(), 0.0);
+    Mean mean;
+    double expected = 0;
+    for (int m = 2; m < 18; m++)
+        expected += m*exact[m]/total;
+    for (const Array& block : ofBlocks) {
+        double sum = 0, norm = 0;
+        for (int m = 2; m < 18; m++) {
+            sum += m*block[m];
+            norm += block[m];
+        }
+        mean.add(sum/norm);
+    }
+    check(expected > 10 && expected < 15.5, "the wall does not count: "+to_string(expected));
+    check(mean.error()*sqrt(blocks/(blocks-1.0)) < 0.02, "too few samples");
+    checkClose(expected, mean.mean(), 0.02+4*mean.error(), 1, "a rod before a wall");
+    for (int m = 8; m < 18; m++) {
+        Mean share;
+        for (const Array& block : ofBlocks)
+            share.add(block[m]/accumulate(block.begin(), block.end(), 0.0));
+        if (exact[m]/total > 0.02)
+            checkClose(exact[m]/total, share.mean(), 5*share.error()+0.002, 1, "the monomers of a rod before a wall");
+    }
+}
+
+static void testRodBeforeWall() {
+    checkRodBeforeWall(0.2);
+    checkRodBeforeWall(20);
+}
+
+/** Two chains share a pool that runs dry. */
+static void testPool() {
+    mt19937_64 generator(4);
+    Growing all;
+    all.system.tables = {makeTable(false)};
+    all.system.pools = {{0, 1000}};
+    all.state.free = {30};
+    const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
+    const int least = 2, monomers = 30+2*10;
+    for (int i = 0; i < 2; i++)
+        all.add(weights, {0, 10}, 12, {}, {30.0+10*i, 0.9}, generator);
+    ChainGrowth growth = all.makeGrowth();
+    // P(N, M) is the product of k_on (free)/V/k_off over the monomers of both, one after the other.
+    double norm = 0, first = 0, second = 0;
+    vector<double> ways(monomers+1, 1);
+    for (int a = least; a <= monomers; a++)
+        for (int b = least; a+b <= monomers; b++) {
+            double weight = 1;
+            for (int i = 0; i < a+b-2*least; i++)
+                weight *= (monomers-2*least-i)/1000.0/0.9*8;
+            weight *= pow(30.0/8, a-least)*pow(40.0/8, b-least);
+            norm += weight;
+            first += a*weight;
+            second += b*weight;
+        }
+    Mean ofFirst, ofSecond;
+    vector<int> changed;
+    for (int block = 0; block < 40; block++) {
+        Mean one, other;
+        for (int i = 0; i < 4000; i++) {
+            growth.advance(all.state, {KT, 5, 3}, all.chains, all.x.data(), {}, changed);
+            one.add(all.state.ranges[0].size());
+            other.add(all.state.ranges[1].size());
+            check(all.state.ranges[0].size()+all.state.ranges[1].size()+all.state.free[0] == monomers, "all monomers");
+        }
+        ofFirst.add(one.mean());
+        ofSecond.add(other.mean());
+    }
+    checkMean(first/norm, ofFirst, 0.05, "the first chain of a pool");
+    checkMean(second/norm, ofSecond, 0.05, "the second chain of a pool");
+}
+
+/** What comes to one chain does not depend on others. */
+static void testOrder() {
+    const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
+    auto grown = [&] (int number) {
+        mt19937_64 generator(4);
+        Growing all;
+        all.system.tables = {makeTable(false)};
+        all.system.pools = {{0.02, 0}};
+        for (int i = 0; i < number; i++)
+            all.add(weights, {0, 30}, 14, {50, 1}, {150, 2}, generator);
+        ChainGrowth growth = all.makeGrowth();
+        vector<int> changed;
+        for (int i = 0; i < 20; i++)
+            growth.advance(all.state, {KT, 0.3, 3}, all.chains, all.x.data(), {}, changed);
+        return Array(all.x.begin(), all.x.begin()+42);
+    };
+    check(grown(1) == grown(5), "a chain by itself and among others");
+}
+
+static double energyOfContacts(const ContactBodies& bodies, const Array& x, double stiffness) {
+    ContactSearch search(bodies.getCapsules());
+    vector<ContactPair> pairs;
+    search.findPairs(x.data(), x.data(), NULL, 0, pairs);
+    double energy = 0;
+    for (const ContactPair& pair : pairs) {
+        Contact contacts[2];
+        const int count = search.evaluate(pair, x.data(), x.data(), contacts, 0);
+        for (int i = 0; i < count; i++)
+            energy += 0.5*stiffness*contacts[i].weight*contacts[i].gap*contacts[i].gap;
+    }
+    return energy;
+}
+
+/** The change at an end is that of the energy of all contacts. */
+static void testContacts() {
+    mt19937_64 generator(8);
+    normal_distribution<double> normal;
+    int touching = 0, passing = 0;
+    for (int round = 0; round < 4000; round++) {
+        // Chains that wind through a small ball, and spheres.
+        vector<vector<Vec3d> > nodes;
+        const int numChains = 5;
+        for (int i = 0; i < numChains; i++) {
+            Vec3d node = {5*normal(generator), 5*normal(generator), 5*normal(generator)};
+            Vec3d along = {normal(generator), normal(generator), normal(generator)};
+            nodes.push_back({node});
+            for (int s = 0; s < 6; s++) {
+                along = along*(1/sqrt(along.squared()))+Vec3d {0.4*normal(generator), 0.4*normal(generator),
+                        0.4*normal(generator)};
+                node = node+along*(8/sqrt(along.squared()));
+                nodes.back().push_back(node);
+            }
+        }
+        const int excluded = 1+round%2;
+        ContactBodies bodies;
+        Array x;
+        ChainList chains;
+        auto describe = [&] (const vector<vector<Vec3d> >& all, bool fills) {
+            bodies = ContactBodies();
+            x.clear();
+            for (const vector<Vec3d>& own : all) {
+                ContactBodies::Chain chain = {{}, 3, excluded, false};
+                Chain mechanics;
+                for (const Vec3d& node : own) {
+                    chain.particles.push_back(x.size()/3);
+                    x.insert(x.end(), {node.x, node.y, node.z});
+                }
+                bodies.chains.push_back(chain);
+                mechanics.nodes = chain.particles;
+                if (fills)
+                    chains.add(mechanics);
+            }
+            for (int i = 0; i < 2; i++) {
+                bodies.spheres.push_back({static_cast<int>(x.size()/3), 4});
+                x.insert(x.end(), {4.0*i, 1, 5});
+            }
+        };
+        describe(nodes, true);
+        EndContacts contacts(bodies, {0, 1, -1, -1, 4}, 5, NULL);
+        contacts.begin(x.data(), chains);
+        const double energy = energyOfContacts(bodies, x, 5);
+
+        // A tip that moves, a joint that comes, or one that goes, at either end.
+        const int chain = round%3 == 2 ? 4 : round%3, kind = round/3%3, end = round/9%2;
+        vector<Vec3d> after = nodes[chain];
+        if (end == 0)
+            reverse(after.begin(), after.end());
+        auto jump = [&] {
+            return Vec3d {1.5*normal(generator), 1.5*normal(generator), 1.5*normal(generator)};
+        };
+        if (kind == 0)
+            after.back() = after.back()+jump();
+        if (kind == 1) {
+            const Vec3d along = after[6]-after[5];
+            after[6] = after[5]+along*0.7+jump();
+            after.push_back(after[6]+along*0.5+jump());
+        }
+        if (kind == 2) {
+            after.pop_back();
+            after.back() = after.back()+jump();
+        }
+        if (end == 0)
+            reverse(after.begin(), after.end());
+        const EndChange change = {chain, end, nodes[chain], after, kind == 2 ? 2 : 1, kind == 1 ? 2 : 1, 0.6};
+        const double found = contacts.findChange(change);
+        vector<vector<Vec3d> > others = nodes;
+        others[chain] = after;
+        describe(others, false);
+        if (isinf(found)) {
+            passing++;
+            continue;
+        }
+        const double difference = energyOfContacts(bodies, x, 5)-energy;
+        touching += difference != 0;
+        checkClose(difference, found, 1+fabs(energy), 1e-9, "the contacts of an end");
+        contacts.accept(change);
+        const EndChange back = {chain, end, after, nodes[chain], kind == 1 ? 2 : 1, kind == 2 ? 2 : 1, 0.6};
+        checkClose(-difference, contacts.findChange(back), 1+fabs(energy), 1e-9, "the contacts of an end that goes back");
+    }
+    check(touching > 700 && passing > 50, "too few contacts: "+to_string(touching)+", "+to_string(passing));
+}
+
+/** A tip does not jump over what is in its way, and a rod that grows towards another one stops before it. */
+static void testRodInTheWay() {
+    mt19937_64 generator(3);
+    Growing all;
+    all.system.tables = {makeTable(false)};
+    all.system.pools = {{0.01, 0}};
+    const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
+    all.add(weights, {0, 10}, 2, {}, {400, 1}, generator);
+    Chain other;
+    other.nodes = {2, 3};
+    other.fixed = {true, true};
+    all.chains.add(other);
+    all.x.insert(all.x.end(), {31, -20, 0.3, 31, 20, 0.3});
+    ContactBodies bodies;
+    bodies.chains = {{{0, 1}, 2, 1, false}, {{2, 3}, 2, 1, false}};
+    EndContacts contacts(bodies, {0, -1}, 1000, NULL);
+    ChainGrowth growth = all.makeGrowth();
+    vector<int> changed;
+    double farthest = 0;
+    for (int i = 0; i < 20000; i++) {
+        growth.advance(all.state, {KT, 1, 3}, all.chains, all.x.data(), {&contacts}, changed);
+        farthest = max(farthest, all.x[3]);
+    }
+    check(farthest > 26 && farthest < 29.7, "a rod in the way");
+}
+
+int main() {
+    return runTests({testDivision, testFreeEnds, testRodBeforeWall, testPool, testOrder, testContacts,
+            testRodInTheWay});
+}
