@@ -40,10 +40,12 @@ from .errors import (
 from .filaments.attachments import Attachment
 from .filaments.filament import Filament, Tether
 from .filaments.filament_type import FilamentType
-from .filaments.presets import DSDNA, F_ACTIN, MICROTUBULE
+from .filaments.growth import Growth, MonomerPool, Monomers
+from .filaments.presets import ACTIN_ATP, DSDNA, F_ACTIN, MICROTUBULE
 from .filaments.segment_place import SegmentPlace
 from .filaments.shapes import FilamentOptions
 from .kinetics.crosslinker import Crosslinker
+from .kinetics.growth_force import FilamentGrowth
 from .kinetics.hand import Hand
 from .kinetics.linker_table import LinkerTable
 from .kinetics.presets import ALPHA_ACTININ, DYNEIN, FILAMIN, KINESIN_1, MYOSIN_II
@@ -63,6 +65,7 @@ from .time_steps.time_step import TimeStep, effective_rate
 from .version import __version__
 
 __all__ = [
+    "ACTIN_ATP",
     "ALPHA_ACTININ",
     "Attachment",
     "BeadSpringType",
@@ -100,10 +103,14 @@ __all__ = [
     "Filaments",
     "FilamentsInContext",
     "Flow",
+    "FilamentGrowth",
+    "Growth",
     "InputError",
     "InstabilityError",
     "MICROTUBULE",
     "MYOSIN_II",
+    "MonomerPool",
+    "Monomers",
     "ObservableCheck",
     "Plane",
     "PrecisionWarning",

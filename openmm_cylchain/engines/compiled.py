@@ -12,6 +12,7 @@ import openmm
 from ..engine_choice import why_openmm_differs
 from ..errors import InputError, InstabilityError, instability_in_force, note_raised_in_force
 from ..kinetics.binding_force import find_binding_force, make_binding_force
+from ..kinetics.growth_force import make_growth_force
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.potentials import BENDING_MODELS as ALL_BENDING_MODELS
 from ..mechanics.potentials import STRETCHING_POTENTIALS
@@ -86,6 +87,7 @@ class CompiledEngine(Engine):
     """The compiled engine: a CylinderChainForce and a CylinderChainIntegrator, on the Reference and CPU platforms."""
 
     has_linkers = True
+    has_growth = True
     has_beam_elements = True
 
     def add_forces(self, system, placed, stretching_force_group, bending_force_group):
@@ -107,6 +109,8 @@ class CompiledEngine(Engine):
         for tether in placed.tethers:
             force.addTether(tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
         system.addForce(force)
+        if any(filament.growth is not None for filament in placed.filaments):
+            system.addForce(make_growth_force(placed.filaments, placed.viscosity, placed.temperature))
         if placed.linkers:
             box = None
             if placed.periodic:

@@ -87,6 +87,9 @@ class Engine(ABC):
     has_linkers = False
     """Whether it knows linkers that bind to filaments and unbind."""
 
+    has_growth = False
+    """Whether it knows filaments that grow."""
+
     has_beam_elements = False
     """Whether it moves filaments of beam elements."""
 

@@ -9,6 +9,7 @@ import numpy as np
 from ..beams.curve import BeamElement
 from ..units.types import FloatArray
 from .chain_type import Chain, ChainType
+from .growth import Growth
 from .placement import joint_stiffnesses
 
 NODE_NAME = "NOD"
@@ -40,6 +41,10 @@ class Filament:
         Of beam elements: P + h r'/3 in nm for a node at P, with the tangent r' there.
     clamped_tangents : tuple of int
         Clamped nodes of beam elements whose tangents do not turn either.
+    growth : Growth or None
+        How it grows, if it does.
+    spare_nodes : int
+        How many particles it has besides its nodes, which become nodes as it grows.
     """
 
     type: ChainType
@@ -50,6 +55,8 @@ class Filament:
     propulsion: float = 0.0
     control_points: FloatArray | None = None
     clamped_tangents: tuple[int, ...] = ()
+    growth: Growth | None = None
+    spare_nodes: int = 0
 
     @property
     def segments(self) -> int:

@@ -282,7 +282,7 @@ class FilamentType(ChainType):
     @property
     def joint_stiffness(self) -> float:
         """Bending stiffness K of one joint in kJ/mol: of the persistence length, or a/l0 of the bending rigidity."""
-        return self._stiffness_of_joint(self.segment_length)
+        return self.stiffness_of_joint(self.segment_length)
 
     @property
     def clamped_joint_stiffness(self) -> float:
@@ -291,7 +291,7 @@ class FilamentType(ChainType):
         Only the half segment on the free side bends. Of a persistence length: the direction of the first free segment
         and that of the held one have ``<t.t'> = exp(-l0/2 l_p)``.
         """
-        return self._stiffness_of_joint(0.5 * self.segment_length)
+        return self.stiffness_of_joint(0.5 * self.segment_length)
 
     @property
     def bending_stiffness(self) -> float:
@@ -303,7 +303,8 @@ class FilamentType(ChainType):
         """``clamped_joint_stiffness``."""
         return self.clamped_joint_stiffness
 
-    def _stiffness_of_joint(self, length):
+    def stiffness_of_joint(self, length: float) -> float:
+        """Bending stiffness in kJ/mol of a joint between segments whose mean length in nm is given."""
         self._refuse_beam("joint stiffness")
         if self.temperature is None or self.bending_rigidity == 0.0:
             return self.bending_rigidity / length

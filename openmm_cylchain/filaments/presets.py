@@ -1,10 +1,12 @@
-"""Filament types of actin, DNA and microtubules."""
+"""Filament types of actin, DNA and microtubules, and what they grow of."""
 
 from openmm import unit
 
 from .filament_type import FilamentType
+from .growth import Monomers
 
 _PICONEWTON = unit.piconewton
+_PER_AMOUNT = unit.liter / unit.mole / unit.second
 _PICONEWTON_PER_NANOMETER = unit.piconewton / unit.nanometer
 
 F_ACTIN = FilamentType(
@@ -65,4 +67,16 @@ MICROTUBULE = FilamentType(
 EI = 2.2e-23 N m^2, that is l_p = 5.2 mm at 37 C: Gittes et al., J. Cell Biol. 1993, 120, 923. EA is an
 estimate, good to some 30 %: Young's modulus 1.2 GPa (same paper, from the same EI) times a wall of about
 220 nm^2. d = 25 nm. Affine extensional friction. Mass: 13 protofilaments of 100 kDa dimers every 8 nm.
+"""
+
+ACTIN_ATP = Monomers(
+    length=2.7 * unit.nanometer,
+    plus_on_rate=unit.Quantity(11.6e6, _PER_AMOUNT),
+    plus_off_rate=1.4 / unit.second,
+    minus_on_rate=unit.Quantity(1.3e6, _PER_AMOUNT),
+    minus_off_rate=0.8 / unit.second,
+)
+"""ATP-actin: Pollard, J. Cell Biol. 1986, 103, 2747: plus end 11.6 /uM/s and 1.4 /s, minus end 1.3 /uM/s and 0.8 /s.
+
+A filament grows by 2.7 nm with a monomer (Holmes et al., Nature 1990, 347, 44). Nucleotides are not told apart.
 """

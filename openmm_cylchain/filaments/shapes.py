@@ -18,6 +18,7 @@ from ..units.quantities import (
 from ..units.types import Indices, Scalar, Vector, Vectors
 from .chain_type import ChainType, Points
 from .filament import Filament
+from .growth import Growth, check_growth
 from .placement import check_shape, in_one_plane, planar_direction
 
 MINIMUM_RING = 4
@@ -132,12 +133,15 @@ class FilamentOptions(TypedDict, total=False):
         F0 of self-propelled filaments: a force F0 t acts on every segment, half on either end, where t is its
         tangent, away from the first node; on beam elements, along their curves. With a negative F0 the filament
         moves with its first node in front. It is not conservative and has no energy.
+    growth : Growth
+        How the filament grows and shrinks at its ends. Its first node is its minus end.
     """
 
     clamped: int | Indices
     clamped_tangents: int | Indices
     planar: bool
     propulsion: Scalar
+    growth: Growth | None
 
 
 def new_filament(
@@ -149,6 +153,7 @@ def new_filament(
     clamped_tangents: int | Indices = (),
     planar: bool = False,
     propulsion: Scalar = 0.0,
+    growth: Growth | None = None,
 ) -> Filament:
     """A Filament with nodes and control points, and FilamentOptions.
 
@@ -167,4 +172,9 @@ def new_filament(
             both = in_one_plane(np.concatenate([positions, control_points]), length, f"{label}, with its tangents,")
             control_points = both[len(positions) :]
     held, held_tangents = filament_type.segment_kind.clamps(clamped, clamped_tangents, len(positions), label)
-    return Filament(filament_type, positions, held, closed, planar, propulsion, control_points, held_tangents)
+    spare = 0
+    if growth is not None:
+        spare = check_growth(growth, filament_type, len(positions) - 1, closed, held, label)
+    return Filament(
+        filament_type, positions, held, closed, planar, propulsion, control_points, held_tangents, growth, spare
+    )

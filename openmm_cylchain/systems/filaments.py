@@ -165,7 +165,8 @@ class Filaments(TiedFilaments):
             nodes, control_points = add_nodes_to_system(system, filament)
             self._nodes.append(nodes)
             self._control_points.append(control_points)
-            everything += [filament.positions, self._add_attachments(system, number)]
+            spare = np.repeat(filament.positions[-1:], filament.spare_nodes, axis=0)
+            everything += [filament.positions, spare, self._add_attachments(system, number)]
             if filament.control_points is not None:
                 everything.insert(-1, filament.control_points)
             names = [self._attachments[index].name for index in self._attachments_of[number]]

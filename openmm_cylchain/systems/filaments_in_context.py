@@ -23,6 +23,7 @@ from ..kinetics.binding_force import (
     set_table,
     table_of,
 )
+from ..kinetics.growth_force import FilamentGrowth, growth_of
 from ..kinetics.linker_table import LinkerTable
 from ..kinetics.linkers import LinkerPulls
 from ..mechanics.flow import Flow
@@ -49,6 +50,19 @@ class FilamentsInContext:
         self._context = context
         # By number, and shared by all that are made for the Context.
         self._moved_tethers = moved_tethers
+
+    def growth(self) -> FilamentGrowth:
+        """How far the filaments that grow have grown: a FilamentGrowth.
+
+        Raises
+        ------
+        InputError
+            If none of them grow, or the Context has got a State that does not say how far they have.
+        """
+        if not any(filament.growth is not None for filament in self._placed.filaments):
+            raise InputError("No filaments grow: give some a growth when they are added.")
+        with naming_unknown_linkers():
+            return growth_of(self._context, self._placed.filaments)
 
     def linkers(self) -> LinkerTable:
         """The linkers that there are, and where they are bound: a LinkerTable.

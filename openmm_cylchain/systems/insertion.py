@@ -54,6 +54,7 @@ def add_nodes_to_system(system: openmm.System, filament: Filament) -> tuple[IntA
     both."""
     masses, control_masses = filament_masses(filament)
     masses[list(filament.clamped)] = 0.0
+    masses = np.concatenate([masses, np.full(filament.spare_nodes, masses[-1])])
     control_masses[list(filament.clamped_tangents)] = 0.0
     nodes, control_points = ([system.addParticle(mass) for mass in own] for own in (masses, control_masses))
     return np.array(nodes), np.array(control_points, dtype=int)
@@ -73,7 +74,7 @@ def add_to_topology(topology: "app.Topology", filament: Filament, name: str, att
     It has a residue and an atom for each node, control point or attachment point.
     """
     chain = topology.addChain(name)
-    nodes = len(filament.positions)
+    nodes = len(filament.positions) + filament.spare_nodes
     atoms = []
     control_names = [CONTROL_POINT_NAME] * (0 if filament.control_points is None else nodes)
     for particle, atom_name in enumerate([NODE_NAME] * nodes + control_names + list(attachment_names)):

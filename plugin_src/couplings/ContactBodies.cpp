@@ -2,11 +2,14 @@
 
 namespace cylchain {
 
-CapsuleSystem ContactBodies::getCapsules() const {
+CapsuleSystem ContactBodies::getCapsules(const std::vector<bool>& isSpare) const {
     CapsuleSystem system;
     std::vector<int> firstOfChain;
     for (const Chain& chain : chains) {
-        const int number = firstOfChain.size(), segments = chain.countSegments();
+        const int number = firstOfChain.size();
+        int segments = chain.countSegments();
+        while (!isSpare.empty() && segments > 0 && isSpare[chain.particles[segments%chain.particles.size()]])
+            segments--;
         firstOfChain.push_back(system.capsules.size());
         for (int segment = 0; segment < segments; segment++)
             system.capsules.push_back({chain.particles[segment], chain.particles[(segment+1)%chain.particles.size()],
@@ -22,8 +25,12 @@ CapsuleSystem ContactBodies::getCapsules() const {
         auto find = [&] (int chain, int segment) {
             return (chain == -1 ? firstSphere : firstOfChain[chain])+segment;
         };
-        system.exclusions.push_back({find(exclusion.chain1, exclusion.segment1),
-                find(exclusion.chain2, exclusion.segment2)});
+        auto isThere = [&] (int chain, int segment) {
+            return chain == -1 || segment < system.chains[chain].numCapsules;
+        };
+        if (isThere(exclusion.chain1, exclusion.segment1) && isThere(exclusion.chain2, exclusion.segment2))
+            system.exclusions.push_back({find(exclusion.chain1, exclusion.segment1),
+                    find(exclusion.chain2, exclusion.segment2)});
     }
     return system;
 }

@@ -30,8 +30,12 @@ struct ContactBodies {
     std::vector<Chain> chains;
     std::vector<Sphere> spheres;
     std::vector<Exclusion> exclusions;
-    /** Describe the segments of all chains, in their order, then the spheres. */
-    CapsuleSystem getCapsules() const;
+    /**
+     * Describe the segments of all chains, in their order, then the spheres.
+     *
+     * @param isSpare  whether each particle is no node of its chain, which grows; none is if there are no numbers
+     */
+    CapsuleSystem getCapsules(const std::vector<bool>& isSpare = {}) const;
 };
 
 } // namespace cylchain

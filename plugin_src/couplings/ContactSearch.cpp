@@ -481,6 +481,10 @@ const CapsuleSystem& ContactSearch::getSystem() const {
     return implementation->system;
 }
 
+void ContactSearch::setSystem(const CapsuleSystem& system) {
+    implementation.reset(new Implementation(system, implementation->nearestImages));
+}
+
 void ContactSearch::setRadius(int capsule, double radius) {
     implementation->system.capsules.at(capsule).radius = radius;
 }

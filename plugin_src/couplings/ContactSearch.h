@@ -53,6 +53,8 @@ public:
     explicit ContactSearch(const CapsuleSystem& system, bool nearestImages = false);
     ~ContactSearch();
     const CapsuleSystem& getSystem() const;
+    /** Search among other capsules from now on. */
+    void setSystem(const CapsuleSystem& system);
     /** Give a capsule another radius, which is not negative. Pairs that were found with other radii may lack some. */
     void setRadius(int capsule, double radius);
     /** Get whether two capsules never touch each other. */

@@ -148,7 +148,7 @@ void ChainGrowth::apply(GrowthState& state, const GrowthStep& step, const Event&
     Present& known = present[event.index];
     if (!aroundIsKnown)
         for (Surroundings* all : around)
-            all->begin(positions, chains);
+            all->begin(positions, chains, step.box);
     aroundIsKnown = true;
     EndEvents& events = state.events[2*event.index+event.end];
     if (!known.isKnown) {
@@ -156,7 +156,7 @@ void ChainGrowth::apply(GrowthState& state, const GrowthStep& step, const Event&
         for (size_t i = 0; i < chain.nodes.size(); i++) {
             const double* x = positions+3*(size_t) chain.nodes[i];
             Vec3d node = {x[0], x[1], x[2]};
-            if (i > 0 && step.box != nullptr) {
+            if (i > 0 && step.takesNearestImages) {
                 const Vec3d& last = known.nodes.back();
                 double along[] = {node.x-last.x, node.y-last.y, node.z-last.z};
                 takeToNearestImage(along, step.box);

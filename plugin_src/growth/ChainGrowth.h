@@ -1,10 +1,10 @@
 #ifndef CYLCHAIN_CHAIN_GROWTH_H_
 #define CYLCHAIN_CHAIN_GROWTH_H_
 
-#include "growth/MonomerTable.h"
+#include "couplings/Surroundings.h"
 #include "growth/SegmentLaws.h"
-#include "growth/Surroundings.h"
 #include "mechanics/ChainList.h"
+#include "mechanics/MonomerTable.h"
 #include <cstdint>
 #include <memory>
 #include <utility>
@@ -68,8 +68,9 @@ struct GrowthState {
 struct GrowthStep {
     double kT, stepSize;
     std::uint32_t seed;
-    /** Whether segments are their shortest images in a periodic box: its three vectors, or NULL. */
+    /** The three vectors of the periodic box, and whether segments are their shortest images in it. */
     const double* box = nullptr;
+    bool takesNearestImages = false;
 };
 
 /**

@@ -20,6 +20,7 @@ namespace std {
 #include "openmm/CylinderChainBindingForce.h"
 #include "openmm/CylinderChainContactForce.h"
 #include "openmm/CylinderChainForce.h"
+#include "openmm/CylinderChainGrowthForce.h"
 #include "openmm/CylinderChainIntegrator.h"
 #include "openmm/CylinderChainLinkForce.h"
 #include "openmm/CylinderChainWallForce.h"
@@ -118,7 +119,8 @@ static void raiseException(const std::exception& e) {
 }
 
 %apply int& OUTPUT {int& bendingModel, int& stretchingModel, int& chain, int& node, int& particle, int& steps,
-        int& particles, int& chain1, int& segment1, int& chain2, int& segment2, int& hand1, int& hand2};
+        int& particles, int& chain1, int& segment1, int& chain2, int& segment2, int& hand1, int& hand2,
+        int& table, int& pool, int& firstMonomer, int& lastMonomer, int& leastMonomers, int& monomersPerSegment};
 
 %typemap(in, numinputs=0) Vec3& point (OpenMM::Vec3 value) {
     $1 = &value;
@@ -209,7 +211,7 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         std::vector<double>& parameters, std::vector<double>& places, std::vector<double>& gaps,
         std::vector<double>& forces, std::vector<double>& sums, std::vector<double>& loads};
 %apply const std::vector<double>& fractions {const std::vector<double>& points,
-        const std::vector<double>& parameters, const std::vector<double>& places};
+        const std::vector<double>& parameters, const std::vector<double>& places, const std::vector<double>& loads};
 
 %typemap(in, numinputs=0) std::vector<Vec3>& vectors (std::vector<OpenMM::Vec3> value) {
     $1 = &value;
@@ -230,7 +232,8 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         double& propulsion, double& work, double& bindingRate, double& reach, double& unbindingRate,
         double& strainShare, double& unbindingForce, double& catchRate, double& catchForce, double& speed,
         double& stallForce, double& volume, double& concentration, double& elementLength, double& stretchingModulus,
-        double& bendingRigidity, double& shortening};
+        double& bendingRigidity, double& shortening, double& minusOnRate, double& minusOffRate, double& plusOnRate,
+        double& plusOffRate};
 %apply bool& OUTPUT {bool& walksBackward, bool& holdsAtEnds, bool& sameChain};
 %apply long long& OUTPUT {long long& bindings, long long& unbindings};
 
@@ -430,6 +433,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %concreteClass(CylinderChainForce, Force)
 %concreteClass(CylinderChainBindingForce, Force)
 %concreteClass(CylinderChainContactForce, Force)
+%concreteClass(CylinderChainGrowthForce, Force)
 %concreteClass(CylinderChainLinkForce, Force)
 %concreteClass(CylinderChainWallForce, Force)
 %concreteClass(CylinderChainIntegrator, Integrator)
@@ -442,6 +446,9 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %ignore OpenMM::CylinderChainBindingForce::getState;
 %ignore OpenMM::CylinderChainBindingForce::getHand;
 %ignore OpenMM::CylinderChainBindingForce::getLinkerType;
+%ignore OpenMM::CylinderChainGrowthForce::getSystem;
+%ignore OpenMM::CylinderChainGrowthForce::getState;
+%ignore OpenMM::CylinderChainGrowthForce::setMonomers;
 %ignore OpenMM::CylinderChainLinkForce::getTable;
 %ignore OpenMM::CylinderChainLinkForce::setTable;
 %import "mechanics/Enumerators.h"
@@ -453,6 +460,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %include "openmm/CylinderChainForce.h"
 %include "openmm/CylinderChainBindingForce.h"
 %include "openmm/CylinderChainContactForce.h"
+%include "openmm/CylinderChainGrowthForce.h"
 %include "openmm/CylinderChainLinkForce.h"
 %include "openmm/CylinderChainWallForce.h"
 %include "openmm/CylinderChainIntegrator.h"

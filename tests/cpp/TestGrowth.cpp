@@ -6,8 +6,8 @@
 #include "TestChains.h"
 #include "couplings/ContactBodies.h"
 #include "growth/ChainGrowth.h"
-#include "growth/EndContacts.h"
-#include "growth/EndWalls.h"
+#include "couplings/EndContacts.h"
+#include "couplings/EndWalls.h"
 #include <map>
 #include <numeric>
 
@@ -443,8 +443,8 @@ static void testContacts() {
             }
         };
         describe(nodes, true);
-        EndContacts contacts(bodies, {0, 1, -1, -1, 4}, 5, NULL);
-        contacts.begin(x.data(), chains);
+        EndContacts contacts(bodies, {0, 1, -1, -1, 4}, 5, false);
+        contacts.begin(x.data(), chains, NULL);
         const double energy = energyOfContacts(bodies, x, 5);
 
         // A tip that moves, a joint that comes, or one that goes, at either end.
@@ -502,7 +502,7 @@ static void testRodInTheWay() {
     all.x.insert(all.x.end(), {31, -20, 0.3, 31, 20, 0.3});
     ContactBodies bodies;
     bodies.chains = {{{0, 1}, 2, 1, false}, {{2, 3}, 2, 1, false}};
-    EndContacts contacts(bodies, {0, -1}, 1000, NULL);
+    EndContacts contacts(bodies, {0, -1}, 1000, false);
     ChainGrowth growth = all.makeGrowth();
     vector<int> changed;
     double farthest = 0;

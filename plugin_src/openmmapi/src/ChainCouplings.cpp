@@ -88,16 +88,18 @@ void ChainCouplings::finishStep(int groups, int integration, double stepSize) {
         own.force->finishStep(own.isTaken(groups), own.force->isIn(integration), stepSize);
 }
 
-/** The forces that have a state of each name. */
-map<string, vector<CouplingForceImpl*> > ChainCouplings::findStates() const {
-    map<string, vector<CouplingForceImpl*> > forces;
-    for (const Coupling& own : couplings)
-        if (!own.force->getStateName().empty())
-            forces[own.force->getStateName()].push_back(own.force);
+/** The Forces that have a state of each name. */
+map<string, vector<StepForceImpl*> > ChainCouplings::findStates() const {
+    map<string, vector<StepForceImpl*> > forces;
+    for (ForceImpl* impl : context.getForceImpls()) {
+        StepForceImpl* const force = dynamic_cast<StepForceImpl*>(impl);
+        if (force != NULL && !force->getStateName().empty())
+            forces[force->getStateName()].push_back(force);
+    }
     return forces;
 }
 
-static void restore(const string& name, const vector<StateColumns>& states, const vector<CouplingForceImpl*>& forces) {
+static void restore(const string& name, const vector<StateColumns>& states, const vector<StepForceImpl*>& forces) {
     const bool areSame = states.size() == forces.size();
     if (!areSame && (forces.empty() || !forces[0]->isStateOfCheckpoints()))
         throw OpenMMException("CylinderChainIntegrator: The State or checkpoint has the "+name+" of "+
@@ -112,7 +114,7 @@ static void restore(const string& name, const vector<StateColumns>& states, cons
 void ChainCouplings::writeStates(ostream& stream) const {
     vector<pair<string, StateColumns> > states;
     for (const auto& entry : findStates())
-        for (CouplingForceImpl* force : entry.second)
+        for (StepForceImpl* force : entry.second)
             states.push_back({entry.first, force->storeState(true)});
     writeValue(stream, (int) states.size());
     for (const auto& state : states) {
@@ -127,7 +129,7 @@ void ChainCouplings::readStates(istream& stream) const {
         const string name = readText(stream, "the states of Forces");
         states[name].push_back(StateColumns::read(stream));
     }
-    map<string, vector<CouplingForceImpl*> > forces = findStates();
+    map<string, vector<StepForceImpl*> > forces = findStates();
     for (const auto& entry : states)
         forces[entry.first];
     for (const auto& entry : forces)
@@ -136,7 +138,7 @@ void ChainCouplings::readStates(istream& stream) const {
 
 void ChainCouplings::writeStates(SerializationNode& node) const {
     for (const auto& entry : findStates())
-        for (CouplingForceImpl* force : entry.second)
+        for (StepForceImpl* force : entry.second)
             if (!force->isStateOfCheckpoints())
                 force->storeState(false).write(node.createChildNode(entry.first));
 }

@@ -11,13 +11,12 @@ namespace OpenMM {
 /** Parameters of curves that differ by less are the same. */
 static const double SAME_PLACE = 1e-9;
 
-CapsuleSystem describeCapsules(const ContactBodies& bodies, const System& system) {
-    const CapsuleSystem capsules = bodies.getCapsules();
-    for (const Capsule& capsule : capsules.capsules)
+CapsuleSystem describeCapsules(const ContactBodies& bodies, const System& system, const vector<bool>& isSpare) {
+    for (const Capsule& capsule : bodies.getCapsules().capsules)
         for (int particle : {capsule.first, capsule.end()})
             if (particle >= system.getNumParticles())
                 throw OpenMMException("CylinderChainContactForce: Illegal particle index: "+to_string(particle));
-    return capsules;
+    return bodies.getCapsules(isSpare);
 }
 
 void findCurves(const vector<Capsule>& capsules, const PlaceResolver& places, vector<CapsuleOnCurve>& onCurves,

@@ -1,4 +1,5 @@
 #include "openmm/internal/CylinderChainContactForceImpl.h"
+#include "couplings/EndContacts.h"
 #include "openmm/CylinderChainKernels.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/System.h"
@@ -6,6 +7,7 @@
 #include "openmm/internal/ContactDescription.h"
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <sstream>
 
 using namespace OpenMM;
@@ -25,7 +27,8 @@ CylinderChainContactForceImpl::CylinderChainContactForceImpl(const CylinderChain
 
 void CylinderChainContactForceImpl::initialize(ContextImpl& context) {
     const System& system = context.getSystem();
-    const CapsuleSystem capsules = describeCapsules(owner.getBodies(), system);
+    isSpare = findSpareNodes(system);
+    const CapsuleSystem capsules = describeCapsules(owner.getBodies(), system, isSpare);
     search.reset(new ContactSearch(capsules));
     findCurves(capsules.capsules, PlaceResolver(system), onCurves, sites);
     kernel = context.getPlatform().createKernel(CalcCylinderChainContactForceKernel::Name(), context);
@@ -46,7 +49,7 @@ vector<string> CylinderChainContactForceImpl::getKernelNames() {
 }
 
 void CylinderChainContactForceImpl::updateParametersInContext(ContextImpl& context) {
-    const CapsuleSystem changed = owner.getBodies().getCapsules();
+    const CapsuleSystem changed = owner.getBodies().getCapsules(isSpare);
     if (changed.capsules.size() != search->getSystem().capsules.size())
         throw OpenMMException("CylinderChainContactForce: Chains and spheres cannot be added to a Context");
     if (changed.exclusions.size() != search->getSystem().exclusions.size())
@@ -55,7 +58,57 @@ void CylinderChainContactForceImpl::updateParametersInContext(ContextImpl& conte
     for (size_t i = 0; i < changed.capsules.size(); i++)
         search->setRadius(i, changed.capsules[i].radius);
     kernel.getAs<CalcCylinderChainContactForceKernel>().copyParametersToContext(context, stiffness);
+    versionOfSurroundings++;
     context.systemChanged();
+}
+
+void CylinderChainContactForceImpl::setSpareNodes(ContextImpl& context, const vector<bool>& isSpare) {
+    this->isSpare = isSpare;
+    const CapsuleSystem capsules = owner.getBodies().getCapsules(isSpare);
+    search->setSystem(capsules);
+    onCurves.clear();
+    sites.clear();
+    findCurves(capsules.capsules, PlaceResolver(context.getSystem()), onCurves, sites);
+    kernel.getAs<CalcCylinderChainContactForceKernel>().copyParametersToContext(context, stiffness);
+}
+
+unique_ptr<Surroundings> CylinderChainContactForceImpl::describeSurroundings(
+        const ChainList& chains, const vector<int>& growing) {
+    const ContactBodies& bodies = owner.getBodies();
+    map<int, int> chainOf;
+    for (int number : growing) {
+        const Chain& chain = chains.getChain(number);
+        for (const vector<int>* particles : {&chain.nodes, &chain.spareNodes})
+            for (int particle : *particles)
+                chainOf[particle] = number;
+    }
+    vector<int> numbers;
+    for (const ContactBodies::Chain& body : bodies.chains) {
+        numbers.push_back(-1);
+        for (size_t i = 0; i < body.particles.size(); i++) {
+            const auto found = chainOf.find(body.particles[i]);
+            if (found == chainOf.end() && numbers.back() == -1)
+                continue;
+            numbers.back() = found == chainOf.end() ? numbers.back() : found->second;
+            const Chain& chain = chains.getChain(numbers.back());
+            const size_t count = chain.nodes.size();
+            const bool isNext = body.particles.size() == count+chain.spareNodes.size() && body.particles[i] ==
+                    (i < count ? chain.nodes[i] : chain.spareNodes[i-count]);
+            if (!isNext)
+                throw OpenMMException("CylinderChainContactForce: "+chains.getName(numbers.back())+" grows, so it must "
+                        "touch others with all of its particles, in their order, or with none");
+        }
+    }
+    for (const ContactBodies::Sphere& sphere : bodies.spheres)
+        if (chainOf.count(sphere.particle) > 0)
+            throw OpenMMException("CylinderChainContactForce: Particle "+to_string(sphere.particle)+" belongs to "+
+                    chains.getNameInSentence(chainOf[sphere.particle])+", which grows, and cannot be a sphere");
+    for (const ContactBodies::Exclusion& exclusion : bodies.exclusions)
+        for (int chain : {exclusion.chain1, exclusion.chain2})
+            if (chain >= 0 && numbers[chain] >= 0)
+                throw OpenMMException("CylinderChainContactForce: "+chains.getName(numbers[chain])+" grows, so there "
+                        "cannot be exclusions of its segments");
+    return make_unique<EndContacts>(bodies, numbers, stiffness, periodic);
 }
 
 /** Call a function with each contact at the present positions, and its pair. */

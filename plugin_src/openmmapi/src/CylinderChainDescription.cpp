@@ -1,5 +1,6 @@
 #include "openmm/internal/CylinderChainDescription.h"
 #include "mechanics/BeadModes.h"
+#include "openmm/CylinderChainGrowthForce.h"
 #include "openmm/OpenMMException.h"
 #include <utility>
 
@@ -44,8 +45,32 @@ CylinderChainDescription::CylinderChainDescription(const System& system, const C
                 chain.fixed.push_back(system.getParticleMass(particle) == 0.0);
         });
     checkFixed(chains);
+    for (int i = 0; i < system.getNumForces(); i++) {
+        const CylinderChainGrowthForce* const growth = dynamic_cast<const CylinderChainGrowthForce*>(
+                &system.getForce(i));
+        if (growth != NULL)
+            growth->setMonomers(chains, growing);
+    }
     checkFriction(chains);
     lookForModes();
+}
+
+vector<bool> findSpareNodes(const System& system) {
+    vector<bool> result(system.getNumParticles(), false);
+    const CylinderChainForce* force = NULL;
+    bool anyGrow = false;
+    for (int i = 0; i < system.getNumForces(); i++) {
+        if (dynamic_cast<const CylinderChainForce*>(&system.getForce(i)) != NULL)
+            force = dynamic_cast<const CylinderChainForce*>(&system.getForce(i));
+        anyGrow |= dynamic_cast<const CylinderChainGrowthForce*>(&system.getForce(i)) != NULL;
+    }
+    if (!anyGrow || force == NULL)
+        return result;
+    const CylinderChainDescription description(system, *force);
+    for (const cylchain::Chain& chain : description.getChains())
+        for (int particle : chain.spareNodes)
+            result[particle] = true;
+    return result;
 }
 
 static void refuseOtherModels(const cylchain::Chain& present, const cylchain::Chain& old) {
@@ -58,6 +83,12 @@ void CylinderChainDescription::update(const CylinderChainForce& force) {
     if (present.size() != chains.size())
         throw OpenMMException("updateParametersInContext: The number of chains has changed");
     for (int i = 0; i < present.size(); i++) {
+        if (growing.count(i) > 0) {
+            if (!present.getChain(i).tethers.empty())
+                throw OpenMMException("updateParametersInContext: Chain "+to_string(i)+" grows, and cannot be tethered");
+            present.getChain(i) = chains.getChain(i);
+            continue;
+        }
         if (present.getKind(i) != chains.getKind(i) || present.getParticles(i) != chains.getParticles(i))
             throw OpenMMException("updateParametersInContext: The particles of a chain have changed");
         if (present.getKind(i) == cylchain::ChainKind::StraightSegments)

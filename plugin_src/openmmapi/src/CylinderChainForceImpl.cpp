@@ -70,6 +70,10 @@ void CylinderChainForceImpl::updateParametersInContext(ContextImpl& context) {
     context.systemChanged();
 }
 
+void CylinderChainForceImpl::haveGrown(ContextImpl& context) {
+    kernel.getAs<CalcCylinderChainForceKernel>().copyParametersToContext(context);
+}
+
 void CylinderChainForceImpl::computeEnergies(ContextImpl& context, double& stretching, double& bending) {
     kernel.getAs<CalcCylinderChainForceKernel>().computeEnergies(context, stretching, bending);
 }

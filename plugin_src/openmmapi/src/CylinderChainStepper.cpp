@@ -44,9 +44,16 @@ static bool isPeriodic(const System& system) {
             box[2] != Vec3(0, 0, 2);
 }
 
+static const CylinderChainGrowthForceImpl* findGrowth(const ContextImpl& context) {
+    for (const ForceImpl* impl : context.getForceImpls())
+        if (dynamic_cast<const CylinderChainGrowthForceImpl*>(impl) != NULL)
+            return dynamic_cast<const CylinderChainGrowthForceImpl*>(impl);
+    return NULL;
+}
+
 CylinderChainStepper::CylinderChainStepper(ContextImpl& context, const CylinderChainIntegrator& integrator,
         CylinderChainForceImpl& force) : context(context), integrator(integrator), chains(force.getDescription()),
-        others(context.getSystem(), integrator, chains), couplings(context, others),
+        growth(findGrowth(context)), others(context.getSystem(), integrator, chains), couplings(context, others),
         kernel(createKernel(context, force, others)),
         explicitWork(getKernel().getLoop()), periodic(isPeriodic(context.getSystem())), recorded(false) {
     getKernel().refuseScheme(static_cast<Scheme>(integrator.getScheme()));
@@ -240,6 +247,8 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
     StepSettings settings = describeStep(seed, level, step);
     recordForces(settings, records);
     takeNoteOfForces(settings, followsOn);
+    if (growth != NULL)
+        growth->refuseForces(getKernel().getForces(context));
     getKernel().displaceOthers(context, settings, integrator.getFriction());
     const CoupledForces& coupled = couplings.describe(getCoupledGroups(), integrator.getFriction());
     if (settings.scheme == Scheme::ImplicitSecondOrder)

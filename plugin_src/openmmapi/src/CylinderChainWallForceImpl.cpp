@@ -1,9 +1,11 @@
 #include "openmm/internal/CylinderChainWallForceImpl.h"
+#include "couplings/EndWalls.h"
 #include "openmm/CylinderChainKernels.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/System.h"
 #include "openmm/internal/ContextImpl.h"
 #include <algorithm>
+#include <map>
 
 using namespace OpenMM;
 using namespace cylchain;
@@ -24,7 +26,41 @@ WallSystem CylinderChainWallForceImpl::describe() const {
             throw OpenMMException("CylinderChainWallForce: Particle "+to_string(own.particle)+
                     " with its radius does not fit into the "+Names<WallShape>::ALL[(int) result.wall.shape]);
     }
+    auto& particles = result.particles;
+    particles.erase(remove_if(particles.begin(), particles.end(), [&] (const WallParticle& own) {
+        return isSpare[own.particle];
+    }), particles.end());
     return result;
+}
+
+void CylinderChainWallForceImpl::setSpareNodes(ContextImpl& context, const vector<bool>& isSpare) {
+    this->isSpare = isSpare;
+    walls = describe();
+    kernel.getAs<CalcCylinderChainWallForceKernel>().copyParametersToContext(context, walls);
+}
+
+unique_ptr<Surroundings> CylinderChainWallForceImpl::describeSurroundings(const ChainList& chains,
+        const vector<int>& growing) {
+    map<int, double> radii;
+    for (int i = 0; i < owner.getNumParticles(); i++)
+        radii[owner.getParticle(i)] = owner.getParticleRadius(i);
+    vector<double> ofChains(chains.size(), -1);
+    for (int number : growing) {
+        const Chain& chain = chains.getChain(number);
+        vector<int> particles = chain.nodes;
+        particles.insert(particles.end(), chain.spareNodes.begin(), chain.spareNodes.end());
+        const auto first = radii.find(particles[0]);
+        if (first != radii.end())
+            ofChains[number] = first->second;
+        for (int particle : particles) {
+            const auto found = radii.find(particle);
+            if (found == radii.end() ? ofChains[number] >= 0 : found->second != ofChains[number])
+                throw OpenMMException("CylinderChainWallForce: "+chains.getName(number)+" grows, so the wall must hold "
+                        "all of its particles, with the same radius, or none, but particle "+to_string(particle)+
+                        " differs from particle "+to_string(particles[0]));
+        }
+    }
+    return make_unique<EndWalls>(owner.getWalls().wall, owner.getStiffness(), ofChains);
 }
 
 void CylinderChainWallForceImpl::initialize(ContextImpl& context) {
@@ -33,6 +69,7 @@ void CylinderChainWallForceImpl::initialize(ContextImpl& context) {
         if (owner.getParticle(i) >= system.getNumParticles())
             throw OpenMMException("CylinderChainWallForce: Illegal particle index: "+to_string(owner.getParticle(i)));
     places.reset(new PlaceResolver(system));
+    isSpare = findSpareNodes(system);
     walls = describe();
     kernel = context.getPlatform().createKernel(CalcCylinderChainWallForceKernel::Name(), context);
     kernel.getAs<CalcCylinderChainWallForceKernel>().initialize(context.getSystem(), walls);
@@ -67,6 +104,7 @@ void CylinderChainWallForceImpl::updateParametersInContext(ContextImpl& context)
         throw OpenMMException("CylinderChainWallForce: Particles cannot be added to a Context");
     walls = present;
     kernel.getAs<CalcCylinderChainWallForceKernel>().copyParametersToContext(context, walls);
+    versionOfSurroundings++;
     context.systemChanged();
 }
 

@@ -10,6 +10,9 @@ OtherParticles::OtherParticles(const System& system, const CylinderChainIntegrat
     for (int chain = 0; chain < chains.getList().size(); chain++)
         for (int particle : chains.getList().getParticles(chain))
             isNode[particle] = true;
+    for (const cylchain::Chain& chain : chains.getChains())
+        for (int particle : chain.spareNodes)
+            isNode[particle] = true;
     masses.resize(numParticles);
     for (int i = 0; i < numParticles; i++) {
         masses[i] = system.getParticleMass(i);

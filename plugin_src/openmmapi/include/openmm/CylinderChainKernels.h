@@ -6,6 +6,7 @@
 #include "couplings/Links.h"
 #include "couplings/Walls.h"
 #include "dynamics/ChainEngine.h"
+#include "growth/ChainGrowth.h"
 #include "kinetics/Linkers.h"
 #include "networks/CoupledForces.h"
 #include "networks/CurveSites.h"
@@ -260,6 +261,36 @@ public:
      * Describe the springs of linkers that join two places.
      */
     virtual void describe(const cylchain::LinkerState& state, std::vector<cylchain::Link>& links) = 0;
+};
+
+/**
+ * This kernel is invoked by CylinderChainGrowthForce to let chains grow.
+ */
+class UpdateCylinderChainGrowthKernel : public KernelImpl {
+public:
+    static std::string Name() {
+        return "UpdateCylinderChainGrowth";
+    }
+    UpdateCylinderChainGrowthKernel(std::string name, const Platform& platform) : KernelImpl(name, platform) {
+    }
+    /**
+     * Initialize the kernel.
+     *
+     * @param system      what grows
+     * @param bending     the bending model of each chain that grows
+     * @param stretching  its stretching model
+     * @param planar      whether it is planar
+     */
+    virtual void initialize(const cylchain::GrowthSystem& system, const std::vector<cylchain::BendingModel>& bending,
+            const std::vector<cylchain::StretchingModel>& stretching, const std::vector<char>& planar) = 0;
+    /**
+     * Take a step of chains that grow, in which all else does not move: see cylchain::ChainGrowth::advance().
+     *
+     * @param periodic  whether segments are taken as their shortest images
+     */
+    virtual int execute(ContextImpl& context, cylchain::GrowthState& state, cylchain::GrowthStep step, bool periodic,
+            cylchain::ChainList& chains, const std::vector<cylchain::Surroundings*>& around,
+            std::vector<int>& changed) = 0;
 };
 
 /**

@@ -4,6 +4,7 @@
 #include "ReferenceCalcCylinderChainLinkForceKernel.h"
 #include "ReferenceCalcCylinderChainWallForceKernel.h"
 #include "ReferenceIntegrateCylinderChainStepKernel.h"
+#include "ReferenceUpdateCylinderChainGrowthKernel.h"
 #include "ReferenceUpdateCylinderChainLinkersKernel.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/reference/ReferencePlatform.h"
@@ -23,6 +24,7 @@ extern "C" void registerKernelFactories() {
             platform.registerKernelFactory(CalcCylinderChainContactForceKernel::Name(), factory);
             platform.registerKernelFactory(CalcCylinderChainLinkForceKernel::Name(), factory);
             platform.registerKernelFactory(CalcCylinderChainWallForceKernel::Name(), factory);
+            platform.registerKernelFactory(UpdateCylinderChainGrowthKernel::Name(), factory);
             platform.registerKernelFactory(UpdateCylinderChainLinkersKernel::Name(), factory);
             platform.registerKernelFactory(IntegrateCylinderChainStepKernel::Name(), factory);
         }
@@ -39,6 +41,8 @@ KernelImpl* ReferenceCylinderChainKernelFactory::createKernelImpl(string name, c
         return new ReferenceCalcCylinderChainLinkForceKernel(name, platform, context);
     if (name == CalcCylinderChainWallForceKernel::Name())
         return new ReferenceCalcCylinderChainWallForceKernel(name, platform);
+    if (name == UpdateCylinderChainGrowthKernel::Name())
+        return new ReferenceUpdateCylinderChainGrowthKernel(name, platform);
     if (name == UpdateCylinderChainLinkersKernel::Name())
         return new ReferenceUpdateCylinderChainLinkersKernel(name, platform, context);
     if (name == IntegrateCylinderChainStepKernel::Name())

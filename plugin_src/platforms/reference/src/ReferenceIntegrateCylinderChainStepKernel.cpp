@@ -168,6 +168,9 @@ void ReferenceIntegrateCylinderChainStepKernel::move(ContextImpl& context, const
 
 void ReferenceIntegrateCylinderChainStepKernel::exchangePositions(ContextImpl& context, double time, int steps) {
     ReferencePlatform::PlatformData& data = extractData(context);
+    for (const Chain& chain : chainKernel->getChains())
+        for (int spare : chain.spareNodes)
+            newPositions[spare] = newPositions[chain.nodes.back()];
     data.positions->swap(newPositions);
 #if CYLCHAIN_OPENMM_VERSION >= 804
     data.virtualSites->computePositions(context.getSystem(), *data.positions, data.periodicBoxVectors);

@@ -65,12 +65,12 @@ public:
      */
     void finishStep(int groups, int integration, double stepSize);
     /**
-     * Write what couplings have in the Context beside positions to a checkpoint, or to a State.
+     * Write what Forces have in the Context beside positions to a checkpoint, or to a State.
      */
     void writeStates(std::ostream& stream) const;
     void writeStates(SerializationNode& node) const;
     /**
-     * Read what writeStates() has written.  A State that has nothing of the kind leaves couplings as they are.
+     * Read what writeStates() has written.  A State that has nothing of the kind leaves Forces as they are.
      */
     void readStates(std::istream& stream) const;
     void readStates(const SerializationNode& node) const;
@@ -93,7 +93,7 @@ private:
         }
     };
     void update();
-    std::map<std::string, std::vector<CouplingForceImpl*> > findStates() const;
+    std::map<std::string, std::vector<StepForceImpl*> > findStates() const;
     ContextImpl& context;
     const OtherParticles& others;
     const PlaceResolver resolver;

@@ -10,8 +10,11 @@ namespace OpenMM {
 
 /**
  * Describe what touches.  An exception is thrown for particles that the System has not.
+ *
+ * @param isSpare  whether each particle is no node of its chain now
  */
-cylchain::CapsuleSystem describeCapsules(const cylchain::ContactBodies& bodies, const System& system);
+cylchain::CapsuleSystem describeCapsules(const cylchain::ContactBodies& bodies, const System& system,
+        const std::vector<bool>& isSpare = {});
 
 /**
  * Find capsules that are straight pieces of beam elements: between virtual sites at neighbouring ones of places at

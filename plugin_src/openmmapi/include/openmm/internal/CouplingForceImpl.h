@@ -2,14 +2,15 @@
 #define OPENMM_COUPLINGFORCEIMPL_H_
 
 #include "dynamics/BrokenCoupling.h"
+#include "couplings/Surroundings.h"
 #include "networks/CoupledForces.h"
 #include "openmm/CylinderChainCoupling.h"
 #include "openmm/Vec3.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/CylinderChainDescription.h"
 #include "openmm/internal/PlaceResolver.h"
-#include "openmm/internal/StateColumns.h"
 #include "openmm/internal/StepForceImpl.h"
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -81,34 +82,25 @@ public:
      */
     virtual std::string describeFailure(const cylchain::BrokenCoupling& coupling, const std::string& other) = 0;
     /**
-     * Get what it calls the state that it has in a Context beside positions; nothing if it has none.
+     * Take note of which particles are no nodes of their chains, because these have grown or shrunk.
      */
-    virtual std::string getStateName() const {
-        return "";
+    virtual void setSpareNodes(ContextImpl&, const std::vector<bool>&) {
     }
     /**
-     * Get whether States do not hold it, but checkpoints alone, and a Context may begin a new one.
-     */
-    virtual bool isStateOfCheckpoints() const {
-        return false;
-    }
-    /**
-     * Store the state; an exception is thrown if it is not known.
+     * Describe it as the ends of chains feel it that grow; NULL if it cannot act on them.
      *
-     * @param inCheckpoint  whether random numbers are to go on as well
+     * @param chains   the chains of the Context
+     * @param growing  the numbers of those that grow
      */
-    virtual StateColumns storeState(bool) {
-        return StateColumns();
+    virtual std::unique_ptr<cylchain::Surroundings> describeSurroundings(const cylchain::ChainList&,
+            const std::vector<int>&) {
+        return nullptr;
     }
     /**
-     * Go on from a state that was stored.
+     * Get a number that increases whenever what describeSurroundings() says changes.
      */
-    virtual void restoreState(const StateColumns&) {
-    }
-    /**
-     * Begin a new state.
-     */
-    virtual void beginState() {
+    virtual int getVersionOfSurroundings() const {
+        return 0;
     }
 protected:
     explicit CouplingForceImpl(const Force& owner) : StepForceImpl(owner) {

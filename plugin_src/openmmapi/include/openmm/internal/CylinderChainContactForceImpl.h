@@ -43,6 +43,9 @@ public:
     cylchain::ImplicitCouplings* getEquations(ContextImpl& context);
     void refuseChains(const CylinderChainDescription& chains) const;
     void refuseBox(ContextImpl& context, const CylinderChainDescription& chains) const;
+    void setSpareNodes(ContextImpl& context, const std::vector<bool>& isSpare);
+    std::unique_ptr<cylchain::Surroundings> describeSurroundings(const cylchain::ChainList& chains,
+            const std::vector<int>& growing);
     std::string describeFailure(const cylchain::BrokenCoupling& coupling, const std::string& other);
 protected:
     void findPushes(ContextImpl& context, std::vector<cylchain::Push>& pushes) const;
@@ -54,6 +57,7 @@ private:
     std::vector<cylchain::CurveSite> sites;
     double stiffness;
     bool periodic;
+    std::vector<bool> isSpare;
     Kernel kernel;
 };
 

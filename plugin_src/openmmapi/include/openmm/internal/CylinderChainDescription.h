@@ -4,6 +4,7 @@
 #include "mechanics/ChainList.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/System.h"
+#include <set>
 #include <string>
 #include <vector>
 
@@ -11,7 +12,7 @@ namespace OpenMM {
 
 /**
  * The chains of a CylinderChainForce in a System, as the kernels of a Context know them.  Nodes that have no mass are
- * fixed.
+ * fixed.  Chains that grow have the nodes, segments and joints of their monomers.
  */
 class CylinderChainDescription {
 public:
@@ -20,6 +21,12 @@ public:
      * Copy the parameters of segments, joints and tethers, for CylinderChainForce::updateParametersInContext().
      */
     void update(const CylinderChainForce& force);
+    /**
+     * Get all chains, so that those that grow may change.
+     */
+    cylchain::ChainList& getGrowingList() {
+        return chains;
+    }
     /**
      * Get all chains, in the order of the Force.
      */
@@ -57,12 +64,20 @@ public:
 private:
     void lookForModes();
     cylchain::ChainList chains;
+    // Those that grow are not taken from the Force any more.
+
+    std::set<int> growing;
     // The first chain that has no modes, and why, or nothing.
 
     std::string withoutModes;
     int forceGroup;
     bool periodic;
 };
+
+/**
+ * Find which particles of a System are no nodes before anything happens, because they belong to chains that grow.
+ */
+std::vector<bool> findSpareNodes(const System& system);
 
 } // namespace OpenMM
 

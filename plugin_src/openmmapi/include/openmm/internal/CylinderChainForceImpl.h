@@ -42,6 +42,13 @@ public:
         return *description;
     }
     /**
+     * Get the chains, so that those that grow may change; call haveGrown() then.
+     */
+    cylchain::ChainList& getGrowingList() {
+        return description->getGrowingList();
+    }
+    void haveGrown(ContextImpl& context);
+    /**
      * Get the Kernel that computes their forces.
      */
     Kernel& getKernel() {

@@ -7,6 +7,7 @@
 #include "openmm/internal/ChainCouplings.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/CylinderChainForceImpl.h"
+#include "openmm/internal/CylinderChainGrowthForceImpl.h"
 #include "openmm/internal/ExplicitWork.h"
 #include "openmm/internal/OtherParticles.h"
 #include <cstdint>
@@ -98,6 +99,9 @@ private:
     ContextImpl& context;
     const CylinderChainIntegrator& integrator;
     const CylinderChainDescription& chains;
+    // NULL if no chains grow.
+
+    const CylinderChainGrowthForceImpl* growth;
     const OtherParticles others;
     ChainCouplings couplings;
     Kernel kernel;

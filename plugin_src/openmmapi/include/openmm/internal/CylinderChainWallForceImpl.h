@@ -36,6 +36,9 @@ public:
         return !walls.particles.empty() && walls.stiffness != 0;
     }
     cylchain::ImplicitCouplings* getEquations(ContextImpl& context);
+    void setSpareNodes(ContextImpl& context, const std::vector<bool>& isSpare);
+    std::unique_ptr<cylchain::Surroundings> describeSurroundings(const cylchain::ChainList& chains,
+            const std::vector<int>& growing);
     std::string describeFailure(const cylchain::BrokenCoupling& coupling, const std::string& other);
 protected:
     void findPushes(ContextImpl& context, std::vector<cylchain::Push>& pushes) const;
@@ -43,6 +46,7 @@ private:
     cylchain::WallSystem describe() const;
     const CylinderChainWallForce& owner;
     std::unique_ptr<PlaceResolver> places;
+    std::vector<bool> isSpare;
     cylchain::WallSystem walls;
     Kernel kernel;
 };

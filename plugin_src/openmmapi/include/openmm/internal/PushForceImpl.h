@@ -34,6 +34,9 @@ public:
     }
     double takeMeanForces(ContextImpl& context, int reader, std::vector<double>& forces, std::vector<int>& numbers,
             std::vector<double>& sums, std::vector<double>& loads);
+    int getVersionOfSurroundings() const {
+        return versionOfSurroundings;
+    }
     std::string getStateName() const {
         return "forces";
     }
@@ -66,6 +69,9 @@ protected:
      */
     std::vector<cylchain::Push> present;
     bool notesPushes = false;
+    // Of parameters, which updateParametersInContext() changes.
+
+    int versionOfSurroundings = 0;
 private:
     cylchain::CouplingImpulses impulses;
 };

@@ -3,6 +3,8 @@
 
 #include "openmm/Force.h"
 #include "openmm/internal/ForceImpl.h"
+#include "openmm/internal/StateColumns.h"
+#include <string>
 
 namespace OpenMM {
 
@@ -35,6 +37,36 @@ public:
      */
     bool isIn(int groups) const {
         return (groups&(1<<forceGroup)) != 0;
+    }
+    /**
+     * Get what it calls the state that it has in a Context beside positions; nothing if it has none.
+     */
+    virtual std::string getStateName() const {
+        return "";
+    }
+    /**
+     * Get whether States do not hold it, but checkpoints alone, and a Context may begin a new one.
+     */
+    virtual bool isStateOfCheckpoints() const {
+        return false;
+    }
+    /**
+     * Store the state; an exception is thrown if it is not known.
+     *
+     * @param inCheckpoint  whether random numbers are to go on as well
+     */
+    virtual StateColumns storeState(bool) {
+        return StateColumns();
+    }
+    /**
+     * Go on from a state that was stored.
+     */
+    virtual void restoreState(const StateColumns&) {
+    }
+    /**
+     * Begin a new state.
+     */
+    virtual void beginState() {
     }
 protected:
     explicit StepForceImpl(const Force& owner) {

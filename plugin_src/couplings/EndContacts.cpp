@@ -1,4 +1,4 @@
-#include "growth/EndContacts.h"
+#include "couplings/EndContacts.h"
 #include "mechanics/PeriodicBox.h"
 #include <algorithm>
 
@@ -22,7 +22,8 @@ Vec3d EndContacts::toNearestImage(const Vec3d& along) const {
     return {v[0], v[1], v[2]};
 }
 
-void EndContacts::begin(const double* positions, const ChainList& chains) {
+void EndContacts::begin(const double* positions, const ChainList& chains, const double* ofStep) {
+    box = periodic ? ofStep : nullptr;
     known.assign(bodies.chains.size()+bodies.spheres.size(), Body());
     largestRadius = 0;
     auto add = [&] (Body& body, int particle) {

@@ -26,8 +26,12 @@ class Surroundings {
 public:
     virtual ~Surroundings() {
     }
-    /** Take note of where all particles are, in a step in which some chain may change. */
-    virtual void begin(const double* positions, const ChainList& chains) = 0;
+    /**
+     * Take note of where all particles are, in a step in which some chain may change.
+     *
+     * @param box  the three vectors of the periodic box, which exist as long as the step
+     */
+    virtual void begin(const double* positions, const ChainList& chains, const double* box) = 0;
     /** Find the change of the energy, infinite if it cannot be. */
     virtual double findChange(const EndChange& change) = 0;
     /** Take note of a change that was made. */

@@ -1,4 +1,4 @@
-#include "growth/EndWalls.h"
+#include "couplings/EndWalls.h"
 
 using namespace cylchain;
 using namespace std;

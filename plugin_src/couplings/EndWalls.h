@@ -2,7 +2,7 @@
 #define CYLCHAIN_END_WALLS_H_
 
 #include "couplings/Walls.h"
-#include "growth/Surroundings.h"
+#include "couplings/Surroundings.h"
 #include <vector>
 
 namespace cylchain {
@@ -14,7 +14,7 @@ public:
     EndWalls(const Wall& wall, double stiffness, const std::vector<double>& radii) : wall(wall), stiffness(stiffness),
             radii(radii) {
     }
-    void begin(const double*, const ChainList&) override {
+    void begin(const double*, const ChainList&, const double*) override {
         // Nodes are all that it acts on.
     }
     double findChange(const EndChange& change) override;

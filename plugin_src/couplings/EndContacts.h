@@ -3,7 +3,7 @@
 
 #include "couplings/ContactBodies.h"
 #include "couplings/ContactSearch.h"
-#include "growth/Surroundings.h"
+#include "couplings/Surroundings.h"
 #include <vector>
 
 namespace cylchain {
@@ -17,12 +17,12 @@ public:
     /**
      * @param bodies    what touches each other
      * @param growing   the number of the chain that grows which each chain of the bodies is, or -1
-     * @param box       the three vectors of a periodic box, or NULL, as they are at each step
+     * @param periodic  whether distances are those of nearest periodic images
      */
-    EndContacts(const ContactBodies& bodies, const std::vector<int>& growing, double stiffness, const double* box) :
-            bodies(bodies), growing(growing), stiffness(stiffness), box(box) {
+    EndContacts(const ContactBodies& bodies, const std::vector<int>& growing, double stiffness, bool periodic) :
+            bodies(bodies), growing(growing), stiffness(stiffness), periodic(periodic) {
     }
-    void begin(const double* positions, const ChainList& chains) override;
+    void begin(const double* positions, const ChainList& chains, const double* box) override;
     double findChange(const EndChange& change) override;
     void accept(const EndChange& change) override;
 private:
@@ -64,7 +64,8 @@ private:
     const ContactBodies bodies;
     const std::vector<int> growing;
     const double stiffness;
-    const double* const box;
+    const bool periodic;
+    const double* box = nullptr;
     std::vector<Body> known;
     double largestRadius = 0;
 };

@@ -1,4 +1,4 @@
-#include "growth/MonomerTable.h"
+#include "mechanics/MonomerTable.h"
 #include <algorithm>
 
 using namespace cylchain;

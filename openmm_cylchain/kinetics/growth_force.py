@@ -1,0 +1,139 @@
+"""The CylinderChainGrowthForce of a System: filaments of the compiled engine that grow."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import openmm
+from openmm import unit
+
+from ..engine_choice import load_plugin
+from ..filaments.filament import Filament
+from ..filaments.growth import joints_by_monomers, segments_by_monomers
+from ..units.quantities import AVOGADRO, LENGTH, NUMBER_DENSITY
+from ..units.types import FloatArray, IntArray
+
+GROWTH_FORCE_NAME = "Growth"
+
+
+def is_growth_force(force: openmm.Force) -> bool:
+    """Whether a force of a System is a CylinderChainGrowthForce."""
+    plugin = load_plugin()
+    return plugin is not None and plugin.CylinderChainGrowthForce.isinstance(force)
+
+
+def find_growth_force(system: openmm.System) -> Any:
+    """The CylinderChainGrowthForce of a System, or None."""
+    for force in system.getForces():
+        if is_growth_force(force):
+            return load_plugin().CylinderChainGrowthForce.cast(force)
+    return None
+
+
+def make_growth_force(filaments: Sequence[Filament], viscosity: float, temperature: float) -> openmm.Force:
+    """The force of the filaments that grow, which are chains of the same numbers."""
+    force = load_plugin().CylinderChainGrowthForce()
+    force.setName(GROWTH_FORCE_NAME)
+    tables: dict[Any, int] = {}
+    pools: dict[int, int] = {}
+    for number, filament in enumerate(filaments):
+        growth, kind = filament.growth, filament.type
+        if growth is None:
+            continue
+        per_segment = growth.monomers_per_segment(kind)
+        key = (kind, growth.monomers.length, growth.fewest_monomers(kind), filament.propulsion)
+        if key not in tables:
+            segments = segments_by_monomers(growth, kind, viscosity, temperature, filament.propulsion)
+            joints = joints_by_monomers(growth, kind)
+            tables[key] = force.addTable(per_segment, segments.ravel().tolist(), joints.tolist())
+        if id(growth.pool) not in pools:
+            pools[id(growth.pool)] = force.addPool(growth.pool.concentration, growth.pool.volume or 0.0)
+        force.addGrowingChain(
+            number,
+            tables[key],
+            pools[id(growth.pool)],
+            0,
+            per_segment * filament.segments,
+            growth.fewest_monomers(kind),
+            *growth.rates("minus"),
+            *growth.rates("plus"),
+        )
+    return force
+
+
+@dataclass(frozen=True)
+class FilamentGrowth:
+    """How far filaments have grown in a Context: those of ``filaments``, in their order.
+
+    Attributes
+    ----------
+    filaments : (n,) int array
+        The numbers of those that grow.
+    monomers : (n, 2) int array
+        The number of the first monomer, at the minus end, and that behind the last one. They begin at zero, so a
+        filament has gone where its numbers have: a treadmilling one forwards.
+    lengths : (n,) Quantity in nm
+        At rest.
+    nodes : (n,) int array
+        How many nodes they have. Others of their particles are spare, and where the last node is.
+    gained, lost, waited : (n, 2) int arrays
+        How many monomers each end, minus and plus, has gained and lost since the start, and how often it would have
+        gained one, but had no spare node.
+    concentrations : (n,) Quantity in mol/l
+        Of free monomers in the pool of each.
+    """
+
+    filaments: IntArray
+    monomers: IntArray
+    lengths: unit.Quantity
+    nodes: IntArray
+    gained: IntArray
+    lost: IntArray
+    waited: IntArray
+    concentrations: unit.Quantity
+
+
+def growth_of(context: openmm.Context, filaments: Sequence[Filament]) -> FilamentGrowth:
+    """How far filaments have grown in a Context of their System."""
+    force = find_growth_force(context.getSystem())
+    ends, events, densities = force.getGrowthInContext(context)
+    monomers, counts = np.array(ends).reshape(-1, 2), np.array(events).reshape(-1, 2, 3).astype(int)
+    numbers, pools = [], []
+    for index in range(len(monomers)):
+        number, _, pool, *_ = force.getGrowingChainParameters(index)
+        numbers.append(number)
+        pools.append(pool)
+    per_monomer = np.array([filaments[number].growth.monomers.length for number in numbers])
+    per_segment = np.array([filaments[number].growth.monomers_per_segment(filaments[number].type) for number in numbers])
+    molar = np.array(densities)[pools] / AVOGADRO
+    return FilamentGrowth(
+        np.array(numbers),
+        monomers,
+        (monomers[:, 1] - monomers[:, 0]) * per_monomer * LENGTH,
+        count_nodes(monomers, per_segment),
+        counts[:, :, 0],
+        counts[:, :, 1],
+        counts[:, :, 2],
+        unit.Quantity(molar, NUMBER_DENSITY * unit.mole).in_units_of(unit.molar),
+    )
+
+
+def count_nodes(monomers: IntArray, per_segment: IntArray | int) -> IntArray:
+    """How many nodes filaments have with the monomers (..., 2) from a first one to before another.
+
+    Joints are at multiples of the monomers of a segment, with half of these or more beyond the last joint at an end.
+    """
+    least = np.asarray(per_segment) // 2
+    first = -((-(monomers[..., 0] + least)) // per_segment)
+    last = (monomers[..., 1] - least) // per_segment
+    return np.maximum(0, last - first + 1) + 2
+
+
+def rest_lengths(monomers: FloatArray, per_segment: int, monomer_length: float) -> FloatArray:
+    """Rest lengths (segments,) in nm of a filament with the monomers from a first one to before another."""
+    first, last = monomers
+    nodes = int(count_nodes(np.asarray(monomers), per_segment))
+    joint = -((-(first + per_segment // 2)) // per_segment)
+    joints = per_segment * (joint + np.arange(nodes - 2))
+    return monomer_length * np.diff(np.concatenate([[first], joints, [last]]))

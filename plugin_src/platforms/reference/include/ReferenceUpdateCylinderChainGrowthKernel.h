@@ -1,0 +1,29 @@
+#ifndef OPENMM_REFERENCEUPDATECYLINDERCHAINGROWTHKERNEL_H_
+#define OPENMM_REFERENCEUPDATECYLINDERCHAINGROWTHKERNEL_H_
+
+#include "openmm/CylinderChainKernels.h"
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * This kernel is invoked by CylinderChainGrowthForce to let chains grow.
+ */
+class ReferenceUpdateCylinderChainGrowthKernel : public UpdateCylinderChainGrowthKernel {
+public:
+    ReferenceUpdateCylinderChainGrowthKernel(std::string name, const Platform& platform) :
+            UpdateCylinderChainGrowthKernel(name, platform) {
+    }
+    void initialize(const cylchain::GrowthSystem& system, const std::vector<cylchain::BendingModel>& bending,
+            const std::vector<cylchain::StretchingModel>& stretching, const std::vector<char>& planar);
+    int execute(ContextImpl& context, cylchain::GrowthState& state, cylchain::GrowthStep step, bool periodic,
+            cylchain::ChainList& chains, const std::vector<cylchain::Surroundings*>& around, std::vector<int>& changed);
+private:
+    std::unique_ptr<cylchain::ChainGrowth> growth;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_REFERENCEUPDATECYLINDERCHAINGROWTHKERNEL_H_*/

@@ -1,0 +1,19 @@
+#include "ReferenceUpdateCylinderChainGrowthKernel.h"
+#include "ReferenceContextData.h"
+
+using namespace OpenMM;
+using namespace cylchain;
+using namespace std;
+
+void ReferenceUpdateCylinderChainGrowthKernel::initialize(const GrowthSystem& system,
+        const vector<BendingModel>& bending, const vector<StretchingModel>& stretching, const vector<char>& planar) {
+    growth = make_unique<ChainGrowth>(system, bending, stretching, planar);
+}
+
+int ReferenceUpdateCylinderChainGrowthKernel::execute(ContextImpl& context, GrowthState& state, GrowthStep step,
+        bool periodic, ChainList& chains, const vector<Surroundings*>& around, vector<int>& changed) {
+    ReferencePlatform::PlatformData& data = extractData(context);
+    step.box = &data.periodicBoxVectors[0][0];
+    step.takesNearestImages = periodic;
+    return growth->advance(state, step, chains, &(*data.positions)[0][0], around, changed);
+}
