@@ -105,7 +105,9 @@ def growth_of(context: openmm.Context, filaments: Sequence[Filament]) -> Filamen
         numbers.append(number)
         pools.append(pool)
     per_monomer = np.array([filaments[number].growth.monomers.length for number in numbers])
-    per_segment = np.array([filaments[number].growth.monomers_per_segment(filaments[number].type) for number in numbers])
+    per_segment = np.array(
+        [filaments[number].growth.monomers_per_segment(filaments[number].type) for number in numbers]
+    )
     molar = np.array(densities)[pools] / AVOGADRO
     return FilamentGrowth(
         np.array(numbers),

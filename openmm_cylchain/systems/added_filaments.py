@@ -245,7 +245,9 @@ class AddedFilaments:
         if not (filament_type.segment_kind.straight or self._engine.has_beam_elements):
             raise InputError(f"{label}: the {self._engine_name} engine has no beam elements: use the compiled one.")
         if options.get("growth") is not None and not self._engine.has_growth:
-            raise InputError(f"{label}: the {self._engine_name} engine has no filaments that grow: use the compiled one.")
+            raise InputError(
+                f"{label}: the {self._engine_name} engine has no filaments that grow: use the compiled one."
+            )
         filament = shapes.new_filament(filament_type, points, label, closed, **options)
         # Friction is computed now, so that a filament that has none is refused here.
         try:
