@@ -13,6 +13,7 @@ from ..units.quantities import (
     AVOGADRO,
     LENGTH,
     NUMBER_DENSITY,
+    ON_RATE,
     RATE,
     VOLUME,
     in_units_of,
@@ -23,9 +24,6 @@ from ..units.quantities import (
 )
 from ..units.types import FloatArray, Scalar
 from .filament_type import FilamentType
-
-ON_RATE = VOLUME * RATE
-"""Unit of the rates of monomers that come, per number of free ones in a volume."""
 
 _PER_AMOUNT = unit.liter / unit.mole / unit.second
 _SAME_LENGTH = 1e-6

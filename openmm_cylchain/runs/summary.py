@@ -42,6 +42,7 @@ _DISTURBANCES = {
     "tethers": "tethers hold them in several places",
     "flow": "the solvent flows",
     "propulsion": "they propel themselves",
+    "growth": "they grow",
 }
 
 
