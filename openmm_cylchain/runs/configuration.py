@@ -41,7 +41,22 @@ from .tables.simulation import SIMULATION, SimulationSettings, read_seed, read_s
 from .tables.solvent import BOX, FLOW, SOLVENT, Solvent, read_flow, read_solvent
 from .toml_lines import lines_of, read_toml
 
-TABLES = (SOLVENT, BOX, FLOW, FILAMENT, MONOMERS, PARTICLES, LINKERS, LINK, JOINT, TETHER, PULL, CONTACTS, WALL, SIMULATION)
+TABLES = (
+    SOLVENT,
+    BOX,
+    FLOW,
+    FILAMENT,
+    MONOMERS,
+    PARTICLES,
+    LINKERS,
+    LINK,
+    JOINT,
+    TETHER,
+    PULL,
+    CONTACTS,
+    WALL,
+    SIMULATION,
+)
 """All kinds of tables, in the order of the reference."""
 
 # Where a key that a table lacks may belong to, in this order.
