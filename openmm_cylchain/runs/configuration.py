@@ -34,8 +34,8 @@ from .tables.couplings import (
 from .tables.filament import FILAMENT, MOST_NODES, read_filaments
 from .tables.filament_types import PRESETS as PRESETS
 from .tables.joints import JOINT, read_joint
-from .tables.monomers import GROWTH, MONOMERS, check_names, check_with_others, read_monomers
 from .tables.linkers import HAND, LINKERS, binds_to, read_linkers
+from .tables.monomers import GROWTH, MONOMERS, check_names, check_with_others, read_monomers
 from .tables.particles import PARTICLES, read_particles
 from .tables.simulation import SIMULATION, SimulationSettings, read_seed, read_simulation
 from .tables.solvent import BOX, FLOW, SOLVENT, Solvent, read_flow, read_solvent

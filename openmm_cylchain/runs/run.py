@@ -60,9 +60,9 @@ def run(configuration, output, resume=False):
     ``topology.cif``, the same for VMD (``topology.psf``) and OVITO (``topology.data``), ``trajectory.dcd`` (the initial
     configuration and one frame per report interval), ``energies.csv`` and ``checkpoint.chk``; with linkers also
     ``linkers.csv`` (how many are bound, their tensions) and ``linkers.npy`` (where each one is, see
-    ``LinkerReporter``); with walls ``wall_forces.csv``, and with contacts ``contact_forces.csv``: forces of each face,
-    and on each filament, means over the steps since the report before; of filaments that grow ``growth.csv``. A resumed run ends with the same files, to the
-    bit, as one that was never interrupted.
+    ``LinkerReporter``); with filaments that grow ``growth.csv``; with walls ``wall_forces.csv``, and with contacts
+    ``contact_forces.csv``: forces of each face, and on each filament, means over the steps since the report before. A
+    resumed run ends with the same files, to the bit, as one that was never interrupted.
 
     Parameters
     ----------

@@ -83,7 +83,9 @@ def _draw(configuration, directory, trajectory, network):
         read_records(directory.linker_places) if configuration.linkers else np.zeros(0, LINKER_RECORD),
         list(zip(labels, colours_of_linkers)),
         (0, -1) if network else (-1,),
-        any(own.kind.is_motor for own in configuration.linkers) or any(group.propulsion for group, *_ in groups),
+        any(own.kind.is_motor for own in configuration.linkers)
+        or any(group.propulsion for group, *_ in groups)
+        or any(grow),
     )
     if network:
         # Theory is that of free filaments: what they do together says more.

@@ -50,8 +50,8 @@ MONOMERS = TableKind(
             "they become fewer. Without it, their concentration stays as it is.",
         ),
     ),
-    "Monomers of which filaments grow, and how many are free, see `Monomers` and `MonomerPool`. Filaments that name the "
-    "same table share them.",
+    "Monomers of which filaments grow, and how many are free, see `Monomers` and `MonomerPool`. Filaments that name "
+    "the same table share them.",
     repeated=True,
 )
 
