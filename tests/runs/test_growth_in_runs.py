@@ -110,7 +110,6 @@ NAMED = MONOMERS + 'name = "other"\n'
         ("a friction_length that is a length", (), {"filament": FILAMENT + GROWTH + 'friction_length = "filament"\n'}),
         ("engine has no filaments that grow", (), {"simulation": TAIL + 'engine = "portable"\n'}),
         ("scheme has no filaments that grow", (), {"simulation": TAIL + 'scheme = "midpoint"\n'}),
-        ("linkers do not bind to filaments that grow yet", (LINKERS + 'volume = "1 um^3"\ncount = 3\n',), {}),
         (
             "anchors must be points where filaments grow",
             ('[[filament]]\ntype = "MICROTUBULE"\nsegments = 2\n', LINKERS, "anchors = [0, 1, 2]\n")
