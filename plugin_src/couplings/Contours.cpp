@@ -10,12 +10,13 @@ Contours::Contours(const ChainList& list) {
 }
 
 void Contours::add(const Chain& own) {
-    Contour contour = {static_cast<int>(segments.size()), static_cast<int>(own.segments.size()), 0, 0, own.closed};
+    Contour contour = {static_cast<int>(segments.size()), static_cast<int>(own.segments.size()), own.start, 0, 0,
+            own.closed};
     bool same = true;
     for (size_t s = 0; s < own.segments.size(); s++) {
         const double length = own.segments[s].restLength;
-        segments.push_back({getNumChains(), own.nodes[s], own.nodes[(s+1)%own.nodes.size()], contour.length, length,
-                {-1, -1}});
+        segments.push_back({getNumChains(), own.nodes[s], own.nodes[(s+1)%own.nodes.size()],
+                own.start+contour.length, length, {-1, -1}});
         contour.length += length;
         same = same && length == own.segments[0].restLength;
     }
@@ -29,14 +30,15 @@ void Contours::add(const BeamChain& own) {
     for (int i = 0; i < elements; i++)
         segments.push_back({getNumChains(), own.particles[2*i], own.particles[(2*i+2)%particles], i*length, length,
                 {own.particles[2*i+1], own.particles[(2*i+3)%particles]}});
-    chains.push_back({static_cast<int>(segments.size())-elements, elements, elements*length, length, own.closed});
+    chains.push_back({static_cast<int>(segments.size())-elements, elements, 0, elements*length, length, own.closed});
 }
 
 int Contours::findSegment(int chain, double position) const {
     const Contour& contour = chains[chain];
     int number;
     if (contour.ofSegments > 0)
-        number = position > 0 ? static_cast<int>(min(position, contour.length)/contour.ofSegments) : 0;
+        number = position > contour.begin ?
+                static_cast<int>(min(position-contour.begin, contour.length)/contour.ofSegments) : 0;
     else {
         const auto first = segments.begin()+contour.firstSegment;
         number = upper_bound(first, first+contour.numSegments, position,

@@ -9,7 +9,8 @@
 namespace cylchain {
 
 /**
- * Lengths along chains, from their minus ends, with segments at rest; and where such lengths are.
+ * Lengths along chains, from their minus ends or where these were before they grew, with segments at rest; and where such
+ * lengths are.
  *
  * Segments of all chains are numbered in the order of the list of chains. Those of beam elements are the elements, on
  * the curves of which lengths are.
@@ -22,6 +23,10 @@ public:
     }
     int getNumSegments() const {
         return segments.size();
+    }
+    /** The length at which a chain begins: zero, unless it has grown there. */
+    double getBegin(int chain) const {
+        return chains[chain].begin;
     }
     /** The length of a chain. */
     double getLength(int chain) const {
@@ -77,7 +82,7 @@ private:
     void add(const BeamChain& beam);
     struct Contour {
         int firstSegment, numSegments;
-        double length;
+        double begin, length;
         /** The length of each segment if all are the same, or else zero. */
         double ofSegments;
         bool closed;

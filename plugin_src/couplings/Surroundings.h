@@ -17,6 +17,8 @@ struct EndChange {
     const std::vector<Vec3d> &before, &after;
     /** How many segments at the end are others, or move: one, or two in the one of both that has a joint more. */
     int segmentsBefore, segmentsAfter;
+    /** The lengths along the chain, at rest, at which these nodes are. */
+    const std::vector<double> &alongBefore, &alongAfter;
     /** Where the new joint is on the segment that is divided, or the old one on that which both become: a fraction. */
     double joint;
 };

@@ -181,7 +181,18 @@ void ChainGrowth::apply(GrowthState& state, const GrowthStep& step, const Event&
         if (node < chain.fixed.size() && chain.fixed[node])
             return;
     }
-    const EndChange change = {own.chain, event.end, known.nodes, after, segments[0], segments[1], joint};
+    MonomerRange range = state.ranges[event.index];
+    if (event.end == 1)
+        range.last += event.gains ? 1 : -1;
+    else
+        range.first += event.gains ? -1 : 1;
+    vector<double> alongBefore, alongAfter;
+    if (!around.empty()) {
+        alongBefore = findLengths(event.index, state.ranges[event.index]);
+        alongAfter = findLengths(event.index, range);
+    }
+    const EndChange change = {own.chain, event.end, known.nodes, after, segments[0], segments[1], alongBefore,
+            alongAfter, joint};
     double difference = 0;
     for (Surroundings* all : around)
         difference += all->findChange(change);
@@ -189,16 +200,25 @@ void ChainGrowth::apply(GrowthState& state, const GrowthStep& step, const Event&
         return;
     for (Surroundings* all : around)
         all->accept(change);
-    MonomerRange& range = state.ranges[event.index];
-    if (event.end == 1)
-        range.last += event.gains ? 1 : -1;
-    else
-        range.first += event.gains ? -1 : 1;
+    state.ranges[event.index] = range;
     if (system.pools[own.pool].isClosed())
         state.free[own.pool] += event.gains ? -1 : 1;
     (event.gains ? events.gained : events.lost)++;
     known.nodes.swap(after);
     known.hasChanged = true;
+}
+
+/** Find the lengths along a chain at which its nodes are. */
+vector<double> ChainGrowth::findLengths(int index, const MonomerRange& range) const {
+    const SegmentDivision division(range, system.tables[system.chains[index].table].monomersPerSegment);
+    const double length = restLengthOf(index, 1);
+    int monomer = range.first;
+    vector<double> result(1, monomer*length);
+    for (int s = 0; s < division.countSegments(); s++) {
+        monomer += division.getMonomers(s);
+        result.push_back(monomer*length);
+    }
+    return result;
 }
 
 /** Draw where the nodes of a chain are after an event. */

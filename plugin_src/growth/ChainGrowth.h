@@ -129,6 +129,7 @@ private:
             ChainList& chains, const double* positions, const std::vector<Surroundings*>& around);
     bool propose(const GrowthState& state, const GrowthStep& step, const Event& event, RandomNumbers& random,
             const std::vector<Vec3d>& nodes, std::vector<Vec3d>& after, int* segments, double& joint);
+    std::vector<double> findLengths(int index, const MonomerRange& range) const;
     void setChain(const GrowthState& state, int index, Chain& chain, double* positions) const;
     const LengthLaw& getLengths(int index, int monomers, double kT);
     const BendLaw& getBends(int index, int monomersOfBoth, double kT);

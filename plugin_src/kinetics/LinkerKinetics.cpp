@@ -32,15 +32,9 @@ LinkerKinetics::LinkerKinetics(const LinkerSystem& ofSystem, const ChainList& ch
     double largestSpacing = 0;
     for (const Hand& hand : system.hands) {
         vector<char> own(contours.getNumChains(), 0);
-        vector<double> sum;
-        double total = 0;
-        for (int chain : hand.chains) {
+        for (int chain : hand.chains)
             own[chain] = 1;
-            total += contours.getLength(chain);
-            sum.push_back(total);
-        }
         binds.push_back(own);
-        sums.push_back(sum);
         int spacing = -1;
         if (hand.siteSpacing > 0) {
             spacing = find(different.begin(), different.end(), hand.siteSpacing)-different.begin();
@@ -60,6 +54,42 @@ LinkerKinetics::LinkerKinetics(const LinkerSystem& ofSystem, const ChainList& ch
     }
     // A place that is proposed may go to the middle of its site, on another segment.
     largestReach += largestSpacing;
+    sumLengths();
+}
+
+/** Find the sums of the lengths of the chains to which hands bind. */
+void LinkerKinetics::sumLengths() {
+    sums.clear();
+    for (const Hand& hand : system.hands) {
+        vector<double> sum;
+        double total = 0;
+        for (int chain : hand.chains) {
+            total += contours.getLength(chain);
+            sum.push_back(total);
+        }
+        sums.push_back(sum);
+    }
+}
+
+bool LinkerKinetics::setChains(const ChainList& chains, LinkerState& state) {
+    contours = Contours(chains);
+    sumLengths();
+    cells.forgetSegments();
+    known = nullptr;
+    state.events.resize(system.types.size());
+    Count count = {vector<LinkerEvents>(system.types.size()), -1};
+    bool any = false;
+    for (Linker& linker : state.linkers)
+        for (int side = 0; side < 2; side++) {
+            const HandPlace before = linker.hands[side];
+            if (!before.isBound() || contours.isClosed(before.chain))
+                continue;
+            stayOnChain(linker, side, count);
+            any = any || !linker.hands[side].isBound() || linker.hands[side].position != before.position;
+        }
+    for (size_t type = 0; type < system.types.size(); type++)
+        state.events[type].unbindings += count.events[type].unbindings;
+    return any;
 }
 
 /** What may happen to a linker. */

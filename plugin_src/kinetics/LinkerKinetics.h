@@ -62,6 +62,12 @@ public:
         system.kT = kT;
     }
     /**
+     * Take note that chains have grown or shrunk. Hands beyond an end let go, or stay there.
+     *
+     * @return whether there were any
+     */
+    bool setChains(const ChainList& chains, LinkerState& state);
+    /**
      * Take a step.
      *
      * @param links  the springs of linkers that join two places then, unless it is NULL
@@ -120,6 +126,7 @@ private:
     void apply(Linker& linker, const KineticStep& step, Pending& next, Sites* sites, Count& count) const;
     void stayOnChain(Linker& linker, int side, Count& count) const;
     void walkAll(Linker& linker, const KineticStep& step, Watch& watch, Count& count) const;
+    void sumLengths();
     void findKinds(const KineticStep& step);
     void findMarks(const KineticStep& step);
     void know(LinkerState& state);
@@ -141,7 +148,7 @@ private:
             HandPlace& found) const;
     void hop(Linker& linker, int side, int direction, Sites* sites, Count& count) const;
     std::uint64_t siteOf(const Hand& hand, const HandPlace& place) const;
-    double countSites(const Hand& hand, int chain) const;
+    bool hasSite(const Hand& hand, int chain, double site) const;
     bool toSite(const Hand& hand, HandPlace& place) const;
     void bind(Linker& linker, int side, const HandPlace& place, Sites* sites, Count& count) const;
     void unbind(Linker& linker, int side, Sites* sites, Count& count) const;

@@ -178,10 +178,11 @@ void LinkerKinetics::stayOnChain(Linker& linker, int side, Count& count) const {
             place.position = max(0.0, place.position-length*rounds);
         return;
     }
-    if (place.position >= 0 && place.position <= length)
+    const double begin = contours.getBegin(place.chain), end = begin+length;
+    if (place.position >= begin && place.position <= end)
         return;
     if (system.hands[system.types[linker.type].hands[side]].holdsAtEnds)
-        place.position = min(length, max(0.0, place.position));
+        place.position = min(end, max(begin, place.position));
     else
         unbind(linker, side, nullptr, count);
 }
@@ -189,20 +190,21 @@ void LinkerKinetics::stayOnChain(Linker& linker, int side, Count& count) const {
 uint64_t LinkerKinetics::siteOf(const Hand& hand, const HandPlace& place) const {
     const uint64_t spacing = spacings[&hand-system.hands.data()];
     return (static_cast<uint64_t>(place.chain)<<36)^(spacing<<32)^
-            static_cast<uint64_t>(place.position/hand.siteSpacing);
+            static_cast<uint32_t>(static_cast<int64_t>(floor(place.position/hand.siteSpacing)));
 }
 
-/** How many sites a chain has. */
-double LinkerKinetics::countSites(const Hand& hand, int chain) const {
+/** Whether a chain has a site of a number: all of it. */
+bool LinkerKinetics::hasSite(const Hand& hand, int chain, double site) const {
     // A length that is a whole number of spacings has as many sites, however it was rounded.
-    return floor(contours.getLength(chain)/hand.siteSpacing+1e-9);
+    const double begin = contours.getBegin(chain), end = begin+contours.getLength(chain);
+    return site >= ceil(begin/hand.siteSpacing-1e-9) && site < floor(end/hand.siteSpacing+1e-9);
 }
 
 /** Take a place to the middle of the site where it is; false if it is on none, at the plus end of a chain. */
 bool LinkerKinetics::toSite(const Hand& hand, HandPlace& place) const {
     const double site = floor(place.position/hand.siteSpacing);
     place.position = (site+0.5)*hand.siteSpacing;
-    return site >= 0 && site < countSites(hand, place.chain);
+    return hasSite(hand, place.chain, site);
 }
 
 void LinkerKinetics::bind(Linker& linker, int side, const HandPlace& place, Sites* sites, Count& count) const {
@@ -282,7 +284,8 @@ bool LinkerKinetics::captureAnywhere(const Linker& linker, int side, RandomNumbe
     const double along = random.uniform()*sum.back();
     const size_t index = min<size_t>(sum.size()-1, upper_bound(sum.begin(), sum.end(), along)-sum.begin());
     found.chain = hand.chains[index];
-    found.position = min(contours.getLength(found.chain), along-(index == 0 ? 0 : sum[index-1]));
+    found.position = contours.getBegin(found.chain)+min(contours.getLength(found.chain),
+            along-(index == 0 ? 0 : sum[index-1]));
     return hand.siteSpacing == 0 || (toSite(hand, found) && sites->count(siteOf(hand, found)) == 0);
 }
 
@@ -290,11 +293,12 @@ bool LinkerKinetics::captureAnywhere(const Linker& linker, int side, RandomNumbe
 void LinkerKinetics::hop(Linker& linker, int side, int direction, Sites* sites, Count& count) const {
     const Hand& hand = system.hands[system.types[linker.type].hands[side]];
     HandPlace next = linker.hands[side];
-    const double number = countSites(hand, next.chain);
     double site = floor(next.position/hand.siteSpacing)+direction;
-    if (contours.isClosed(next.chain))
+    if (contours.isClosed(next.chain)) {
+        const double number = floor(contours.getLength(next.chain)/hand.siteSpacing+1e-9);
         site -= number*floor(site/number);
-    if (site < 0 || site >= number) {
+    }
+    if (!hasSite(hand, next.chain, site)) {
         if (!hand.holdsAtEnds)
             unbind(linker, side, sites, count);
         return;

@@ -41,6 +41,10 @@ public:
      */
     void build(const Contours& contours, const double* positions, double reach, const double* box,
             const double* segmentBox, bool forPoints);
+    /** Take note that segments are others than those that were cut. */
+    void forgetSegments() {
+        reachOfPieces = 0;
+    }
     /** The number of the piece at a length along a segment. */
     int findPiece(const Contours& contours, int segment, double along) const;
     const SegmentPiece& getPiece(int piece) const {

@@ -57,6 +57,8 @@ struct Chain {
     bool closed = false;
     /** Whether nodes keep their z, which must be the same for all of them. */
     bool planar = false;
+    /** The length along the chain at which its first node is: not zero where a chain has grown there. */
+    double start = 0;
     int numNodes() const {
         return nodes.size();
     }

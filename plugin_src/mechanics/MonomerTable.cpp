@@ -33,6 +33,7 @@ void cylchain::setMonomers(Chain& chain, const MonomerTable& table, MonomerRange
     chain.nodes.assign(particles.begin(), particles.begin()+count+1);
     chain.spareNodes.assign(particles.begin()+count+1, particles.end());
     chain.fixed.resize(count+1, false);
+    chain.start = range.first*table.getSegment(1).restLength;
     chain.segments.resize(count);
     chain.joints.resize(count-1);
     for (int s = 0; s < count; s++)

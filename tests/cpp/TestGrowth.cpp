@@ -7,6 +7,7 @@
 #include "couplings/ContactBodies.h"
 #include "growth/ChainGrowth.h"
 #include "couplings/EndContacts.h"
+#include "couplings/EndLinks.h"
 #include "couplings/EndWalls.h"
 #include <map>
 #include <numeric>
@@ -468,7 +469,8 @@ static void testContacts() {
         }
         if (end == 0)
             reverse(after.begin(), after.end());
-        const EndChange change = {chain, end, nodes[chain], after, kind == 2 ? 2 : 1, kind == 1 ? 2 : 1, 0.6};
+        const EndChange change = {chain, end, nodes[chain], after, kind == 2 ? 2 : 1, kind == 1 ? 2 : 1,
+                {}, {}, 0.6};
         const double found = contacts.findChange(change);
         vector<vector<Vec3d> > others = nodes;
         others[chain] = after;
@@ -481,10 +483,118 @@ static void testContacts() {
         touching += difference != 0;
         checkClose(difference, found, 1+fabs(energy), 1e-9, "the contacts of an end");
         contacts.accept(change);
-        const EndChange back = {chain, end, after, nodes[chain], kind == 1 ? 2 : 1, kind == 2 ? 2 : 1, 0.6};
+        const EndChange back = {chain, end, after, nodes[chain], kind == 1 ? 2 : 1, kind == 2 ? 2 : 1,
+                {}, {}, 0.6};
         checkClose(-difference, contacts.findChange(back), 1+fabs(energy), 1e-9, "the contacts of an end that goes back");
     }
     check(touching > 700 && passing > 50, "too few contacts: "+to_string(touching)+", "+to_string(passing));
+}
+
+/** The change at an end is that of the energy of all links, whose places stay where they are along chains. */
+static void testLinks() {
+    mt19937_64 generator(8);
+    normal_distribution<double> normal;
+    uniform_real_distribution<double> uniform;
+    int moved = 0;
+    for (int round = 0; round < 500; round++) {
+        const vector<double> along[] = {{-3, 5, 15, 25, 32}, {0, 10, 20, 27}};
+        vector<vector<Vec3d> > nodes(2);
+        Array x;
+        ChainList chains;
+        for (int i = 0; i < 2; i++) {
+            Chain chain;
+            for (size_t node = 0; node < along[i].size(); node++) {
+                nodes[i].push_back({5*normal(generator), 5*normal(generator), 5*normal(generator)});
+                chain.nodes.push_back(x.size()/3);
+                x.insert(x.end(), {nodes[i][node].x, nodes[i][node].y, nodes[i][node].z});
+            }
+            chains.add(chain);
+        }
+        auto placeOn = [&] (int chain, double length, const vector<Vec3d>& at, const vector<double>& lengths,
+                Vec3d& found) {
+            if (length < lengths.front() || length > lengths.back())
+                return false;
+            size_t s = 0;
+            while (s+2 < lengths.size() && length > lengths[s+1])
+                s++;
+            const double fraction = (length-lengths[s])/(lengths[s+1]-lengths[s]);
+            found = at[s]*(1-fraction)+at[s+1]*fraction;
+            check(chain >= 0, "a chain");
+            return true;
+        };
+        vector<GrowingLink> links;
+        for (int i = 0; i < 20; i++) {
+            GrowingLink link = {{}, 0.3+uniform(generator), 4*uniform(generator)};
+            for (int end = 0; end < 2; end++) {
+                LinkEnd& own = link.ends[end];
+                own.chain = i%5 == 0 && end == 1 ? -1 : (i+end)%2;
+                for (int k = 0; k < 3 && own.chain < 0; k++)
+                    own.place.point[k] = 5*normal(generator);
+                if (own.chain < 0)
+                    continue;
+                const vector<double>& lengths = along[own.chain];
+                own.along = lengths.front()+uniform(generator)*(lengths.back()-lengths.front());
+                size_t s = 0;
+                while (s+2 < lengths.size() && own.along > lengths[s+1])
+                    s++;
+                own.place.first = chains.getChain(own.chain).nodes[s];
+                own.place.second = chains.getChain(own.chain).nodes[s+1];
+                own.place.fraction = (own.along-lengths[s])/(lengths[s+1]-lengths[s]);
+            }
+            links.push_back(link);
+        }
+        vector<vector<Vec3d> > now = nodes;
+        vector<vector<double> > lengths(along, along+2);
+        auto energy = [&] {
+            double sum = 0;
+            for (const GrowingLink& link : links) {
+                Vec3d ends[2];
+                bool holds = true;
+                for (int end = 0; end < 2; end++) {
+                    const LinkEnd& own = link.ends[end];
+                    ends[end] = {own.place.point[0], own.place.point[1], own.place.point[2]};
+                    if (own.chain >= 0)
+                        holds = placeOn(own.chain, own.along, now[own.chain], lengths[own.chain], ends[end]) && holds;
+                }
+                const double extension = sqrt((ends[1]-ends[0]).squared())-link.restLength;
+                sum += holds ? 0.5*link.stiffness*extension*extension : 0;
+            }
+            return sum;
+        };
+        EndLinks felt([&] (vector<GrowingLink>& found) {found = links;}, false, false);
+        felt.begin(x.data(), chains, NULL);
+        // Changes that are made one after the other: a tip moves, a joint comes at the plus end, the minus end shrinks.
+        for (int i = 0; i < 4; i++) {
+            const int chain = i%2, end = i/2 == 0 ? 1 : 0;
+            vector<Vec3d> after = now[chain];
+            vector<double> alongAfter = lengths[chain];
+            int segments[] = {1, 1};
+            const Vec3d jump = {normal(generator), normal(generator), normal(generator)};
+            if (end == 1 && round%2 == 0) {
+                after.back() = after.back()+jump;
+                alongAfter.back() += 1;
+            }
+            else if (end == 1) {
+                after.push_back(after.back()+jump*4);
+                alongAfter.back() -= 1;
+                alongAfter.push_back(alongAfter.back()+5);
+                segments[1] = 2;
+            }
+            else {
+                after.front() = after.front()+jump;
+                alongAfter.front() += 1.5;
+            }
+            const EndChange change = {chain, end, now[chain], after, segments[0], segments[1], lengths[chain],
+                    alongAfter, 0.7};
+            const double found = felt.findChange(change), before = energy();
+            felt.accept(change);
+            now[chain] = after;
+            lengths[chain] = alongAfter;
+            moved += found != 0;
+            checkClose(energy()-before, found, 1+fabs(before), 1e-9, "the links of an end");
+        }
+    }
+    check(moved > 1000, "too few links");
 }
 
 /** A tip does not jump over what is in its way, and a rod that grows towards another one stops before it. */
@@ -514,6 +624,6 @@ static void testRodInTheWay() {
 }
 
 int main() {
-    return runTests({testDivision, testFreeEnds, testRodBeforeWall, testPool, testOrder, testContacts,
+    return runTests({testDivision, testFreeEnds, testRodBeforeWall, testPool, testOrder, testContacts, testLinks,
             testRodInTheWay});
 }

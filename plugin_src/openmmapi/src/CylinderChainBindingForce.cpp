@@ -253,7 +253,7 @@ static LinkerColumns columnsOf(const vector<int>& numbers, const vector<int>& ty
 void CylinderChainBindingForce::setLinkers(const vector<int>& numbers, const vector<int>& types,
         const vector<int>& anchors, const vector<int>& chains, const vector<double>& places, int nextNumber) {
     const vector<Linker> linkers = columnsOf(numbers, types, anchors, chains, places, nextNumber).getLinkers();
-    checkLinkers(linkers, {hands, this->types, this->anchors, 0.0}, {});
+    checkLinkers(linkers, {hands, this->types, this->anchors, 0.0});
     state.linkers = linkers;
     state.clocks.clear();
     state.nextNumber = nextNumber;

@@ -1,5 +1,6 @@
 #include "openmm/internal/CylinderChainBindingForceImpl.h"
 #include "couplings/Contours.h"
+#include "couplings/EndLinks.h"
 #include "openmm/CylinderChainException.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/CylinderChainIntegrator.h"
@@ -80,19 +81,16 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
     require(chains != NULL, "The System has no CylinderChainForce with chains to bind to");
     parameter = "CylinderChainLinkers"+to_string(number);
     const CylinderChainDescription description(ofContext, *chains);
-    const cylchain::Contours contours(description.getList());
-    lengths.clear();
-    for (int chain = 0; chain < contours.getNumChains(); chain++)
-        lengths.push_back(contours.getLength(chain));
+    contours.reset(new cylchain::Contours(description.getList()));
     system = {};
     set<double> spacings;
     for (int i = 0; i < owner.getNumHands(); i++) {
         system.hands.push_back(owner.getHand(i));
         const cylchain::Hand& hand = system.hands.back();
-        require(hand.chains.empty() || hand.chains.back() < contours.getNumChains(),
+        require(hand.chains.empty() || hand.chains.back() < contours->getNumChains(),
                 "Hand "+to_string(i)+" binds to a chain that does not exist");
         for (int chain : hand.chains)
-            require(hand.siteSpacing == 0 || lengths[chain]/hand.siteSpacing < MOST_SITES, "Chain "+
+            require(hand.siteSpacing == 0 || contours->getLength(chain)/hand.siteSpacing < MOST_SITES, "Chain "+
                     to_string(chain)+" would have more than a thousand million sites of hand "+to_string(i)+
                     ": sites so near to each other cannot be told apart");
         if (hand.siteSpacing > 0)
@@ -119,7 +117,7 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
         system.anchors.push_back(place);
     }
     state = owner.getState();
-    checkLinkers(state.linkers, system, lengths);
+    checkLinkers(state.linkers, system, contours.get());
     const CylinderChainIntegrator* integrator = findIntegrator();
     seed = (uint32_t) (integrator == NULL ? owner.getRandomNumberSeed() : integrator->getRandomNumberSeed());
     if (seed == 0)
@@ -228,13 +226,48 @@ const cylchain::LinkerState& CylinderChainBindingForceImpl::getState() {
 }
 
 void CylinderChainBindingForceImpl::setState(const cylchain::LinkerState& replaced) {
-    checkLinkers(replaced.linkers, system, lengths);
+    checkLinkers(replaced.linkers, system, contours.get());
     require(replaced.clocks.size() <= replaced.linkers.size() && all_of(replaced.clocks.begin(),
             replaced.clocks.end(), [] (double clock) {return isfinite(clock);}), "A linker has an illegal clock");
     require(replaced.events.size() <= system.types.size(), "There are events of a type of linkers that does not exist");
     state = replaced;
     hasStepped = false;
     accept();
+}
+
+void CylinderChainBindingForceImpl::chainsHaveGrown(ContextImpl&, const cylchain::ChainList& chains) {
+    contours.reset(new cylchain::Contours(chains));
+    upToDate = false;
+    if (linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().setChains(chains, state))
+        accept();
+}
+
+unique_ptr<cylchain::Surroundings> CylinderChainBindingForceImpl::describeSurroundings(
+        const cylchain::ChainList& chains, const vector<int>& growing) {
+    for (size_t i = 0; i < system.anchors.size(); i++)
+        for (int number : growing) {
+            const cylchain::Chain& chain = chains.getChain(number);
+            for (const vector<int>* particles : {&chain.nodes, &chain.spareNodes})
+                require(find(particles->begin(), particles->end(), system.anchors[i].first) == particles->end(),
+                        "Anchor "+to_string(i)+" is a particle of "+chains.getNameInSentence(number)+
+                        ", which grows: anchor linkers at points or at other particles");
+        }
+    return make_unique<cylchain::EndLinks>([this] (vector<cylchain::GrowingLink>& links) {
+        for (const cylchain::Linker& linker : state.linkers) {
+            if (!linker.pulls())
+                continue;
+            const cylchain::LinkerType& type = system.types[linker.type];
+            cylchain::GrowingLink link = {{}, type.stiffness, type.restLength};
+            for (int side = 0; side < 2; side++) {
+                const cylchain::HandPlace& hand = linker.hands[side];
+                if (hand.isBound())
+                    link.ends[side] = {hand.chain, hand.position, contours->findPlace(hand.chain, hand.position)};
+                else
+                    link.ends[side].place = system.anchors[linker.anchor];
+            }
+            links.push_back(link);
+        }
+    }, owner.usesPeriodicBoundaryConditions(), nearestParticles);
 }
 
 double CylinderChainBindingForceImpl::calcForcesAndEnergy(ContextImpl&, bool includeForces,

@@ -186,6 +186,8 @@ void CylinderChainGrowthForceImpl::updateContextState(ContextImpl& context, bool
     if (changed.empty())
         return;
     chains->haveGrown(context);
+    for (CouplingForceImpl* coupling : couplings)
+        coupling->chainsHaveGrown(context, list);
     const bool otherNodes = any_of(changed.begin(), changed.end(), [&] (int i) {
         return list.getNumNodes(growing[i]) != numNodes[i];
     });
@@ -235,6 +237,8 @@ void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
         cylchain::setMonomers(list.getChain(growing[i]), system.tables[system.chains[i].table], state.ranges[i]);
     chains->haveGrown(*context);
     setSpareNodes();
+    for (CouplingForceImpl* coupling : couplings)
+        coupling->chainsHaveGrown(*context, list);
     accept();
 }
 

@@ -101,7 +101,7 @@ LinkerState restoreLinkers(const StateColumns& columns) {
     return state;
 }
 
-void checkLinkers(const vector<Linker>& linkers, const LinkerSystem& system, const vector<double>& lengths) {
+void checkLinkers(const vector<Linker>& linkers, const LinkerSystem& system, const Contours* contours) {
     // Sites by chain, spacing and number.
     set<tuple<int, double, long long> > sites;
     for (const Linker& linker : linkers) {
@@ -129,17 +129,19 @@ void checkLinkers(const vector<Linker>& linkers, const LinkerSystem& system, con
             const Hand& hand = system.hands[type.hands[side]];
             if (!binary_search(hand.chains.begin(), hand.chains.end(), place.chain))
                 refuseLinkers(name+" is bound to filament "+to_string(place.chain)+", to which its hand does not bind");
-            if (!(place.position >= 0))
+            const double begin = contours == NULL ? 0 : contours->getBegin(place.chain);
+            if (!(place.position >= begin-1e-9*fabs(begin)))
                 refuseLinkers(name+" is bound at an illegal position along filament "+to_string(place.chain));
-            if (lengths.empty())
+            if (contours == NULL)
                 continue;
-            const double length = lengths[place.chain];
-            if (!(place.position <= length*(1+1e-9)))
+            const double length = contours->getLength(place.chain), end = begin+length;
+            if (!(place.position <= end+1e-9*(fabs(begin)+length)))
                 refuseLinkers(name+" is bound "+to_string(place.position)+" nm along filament "+to_string(place.chain)+
-                        ", which is only "+to_string(length)+" nm long");
+                        (begin == 0 ? ", which is only "+to_string(length)+" nm long" : ", which has grown to between "+
+                        to_string(begin)+" and "+to_string(end)+" nm"));
             if (hand.siteSpacing > 0) {
                 const long long site = (long long) floor(place.position/hand.siteSpacing);
-                if (site >= floor(length/hand.siteSpacing+1e-9) ||
+                if (site < ceil(begin/hand.siteSpacing-1e-9) || site >= floor(end/hand.siteSpacing+1e-9) ||
                         !sites.insert(make_tuple(place.chain, hand.siteSpacing, site)).second)
                     refuseLinkers(name+" is bound to site "+to_string(site)+" of filament "+to_string(place.chain)+
                             ", which does not exist or is taken");

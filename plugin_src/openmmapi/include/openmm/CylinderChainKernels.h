@@ -243,6 +243,13 @@ public:
     virtual void initialize(const cylchain::LinkerSystem& system, const cylchain::ChainList& chains, bool periodic,
             bool nearestParticles) = 0;
     /**
+     * Take note that chains have grown or shrunk, where this platform has such: see
+     * cylchain::LinkerKinetics::setChains().
+     */
+    virtual bool setChains(const cylchain::ChainList&, cylchain::LinkerState&) {
+        return false;
+    }
+    /**
      * Take a step of the linkers, in which particles do not move.
      *
      * @param context     the context in which to execute this kernel

@@ -16,6 +16,9 @@ public:
     ReferenceUpdateCylinderChainLinkersKernel(std::string name, const Platform& platform, ContextImpl& context);
     void initialize(const cylchain::LinkerSystem& system, const cylchain::ChainList& chains, bool periodic,
             bool nearestParticles);
+    bool setChains(const cylchain::ChainList& chains, cylchain::LinkerState& state) {
+        return kinetics->setChains(chains, state);
+    }
     long long execute(ContextImpl& context, cylchain::LinkerState& state, double kT, double stepSize,
             std::uint32_t seed, int force, std::vector<cylchain::Link>& links);
     void describe(const cylchain::LinkerState& state, std::vector<cylchain::Link>& links);

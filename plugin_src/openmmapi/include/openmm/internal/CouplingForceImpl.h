@@ -87,6 +87,11 @@ public:
     virtual void setSpareNodes(ContextImpl&, const std::vector<bool>&) {
     }
     /**
+     * Take note that chains have grown or shrunk, whether they have other nodes or not.
+     */
+    virtual void chainsHaveGrown(ContextImpl&, const cylchain::ChainList&) {
+    }
+    /**
      * Describe it as the ends of chains feel it that grow; NULL if it cannot act on them.
      *
      * @param chains   the chains of the Context

@@ -1,6 +1,7 @@
 #ifndef OPENMM_CYLINDERCHAINBINDINGFORCEIMPL_H_
 #define OPENMM_CYLINDERCHAINBINDINGFORCEIMPL_H_
 
+#include "couplings/Contours.h"
 #include "couplings/Links.h"
 #include "kinetics/Linkers.h"
 #include "openmm/CylinderChainBindingForce.h"
@@ -8,6 +9,7 @@
 #include "openmm/internal/SpringForceImpl.h"
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -55,6 +57,9 @@ public:
     int getOrder() const {
         return 1;
     }
+    void chainsHaveGrown(ContextImpl& context, const cylchain::ChainList& chains);
+    std::unique_ptr<cylchain::Surroundings> describeSurroundings(const cylchain::ChainList& chains,
+            const std::vector<int>& growing);
     std::string getStateName() const {
         return "linkers";
     }
@@ -81,7 +86,7 @@ private:
     std::string parameter;
     cylchain::LinkerState state;
     cylchain::LinkerSystem system;
-    std::vector<double> lengths;
+    std::unique_ptr<cylchain::Contours> contours;
     std::vector<cylchain::Link> links;
     std::uint32_t seed;
     int number;

@@ -1,6 +1,7 @@
 #ifndef OPENMM_LINKERDESCRIPTION_H_
 #define OPENMM_LINKERDESCRIPTION_H_
 
+#include "couplings/Contours.h"
 #include "kinetics/Linkers.h"
 #include "openmm/internal/StateColumns.h"
 #include <cstddef>
@@ -36,10 +37,10 @@ cylchain::LinkerState restoreLinkers(const StateColumns& columns);
 /**
  * Throw an exception unless linkers fit their types, the anchors and the chains.
  *
- * @param lengths  the lengths of chains; positions along them are not looked at if there are none
+ * @param contours  the chains; positions along them are not looked at if it is NULL
  */
 void checkLinkers(const std::vector<cylchain::Linker>& linkers, const cylchain::LinkerSystem& system,
-        const std::vector<double>& lengths);
+        const cylchain::Contours* contours = NULL);
 
 } // namespace OpenMM
 
