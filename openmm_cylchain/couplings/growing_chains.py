@@ -53,7 +53,7 @@ def refuse_links_of_growing(system: openmm.System, places: LinkPlaces, numbers: 
 
 
 def refuse_forces_on_growing(system: openmm.System) -> None:
-    """Raise InputError for a stock force of OpenMM that names a particle of a filament that grows.
+    """Raise InputError for a stock force of OpenMM, or anchors of linkers, on a particle of a filament that grows.
 
     Not where particles interact by their parameters, such as charges: those of filaments have none.
     """
@@ -66,6 +66,10 @@ def refuse_forces_on_growing(system: openmm.System) -> None:
 
 
 def _named_particles(force):
+    plugin = load_plugin()
+    if plugin.CylinderChainBindingForce.isinstance(force):
+        linkers = plugin.CylinderChainBindingForce.cast(force)
+        yield from (linkers.getAnchor(index)[0] for index in range(linkers.getNumAnchors()))
     if isinstance(force, openmm.CustomExternalForce):
         yield from (force.getParticleParameters(index)[0] for index in range(force.getNumParticles()))
     if isinstance(force, openmm.CustomCentroidBondForce):

@@ -276,7 +276,11 @@ class FilamentsInContext:
         positions = state.getPositions(asNumpy=True)._value
         box = state.getPeriodicBoxVectors(asNumpy=True)._value if force.usesPeriodicBoundaryConditions() else None
         table, curves = self.linkers(), BeamCurves.of_system(self._context.getSystem())
-        return force, table, self._placed.filaments, self._placed.node_indices, positions, box, curves
+        filaments, monomers = self._placed.filaments, None
+        if any(filament.growth is not None for filament in filaments):
+            growth = self.growth()
+            monomers = dict(zip(growth.filaments.tolist(), growth.monomers))
+        return force, table, filaments, self._placed.node_indices, positions, box, curves, monomers
 
     def _binding_force(self):
         force = find_binding_force(self._context.getSystem())

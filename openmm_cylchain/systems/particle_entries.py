@@ -77,8 +77,8 @@ def _refuse_force(force, label, may_coincide):
     everywhere = kind in _PAIRS_EVERYWHERE or (kind == "CustomGBForce" and _has_pairs_without_exclusions(force))
     if may_coincide and everywhere:
         raise InputError(
-            f"{label} divides by distances of all pairs, but beads, attachment points and spare nodes of filaments that "
-            "grow may be where nodes are. Leave them out: capsule_contact_force and crosslinks need none."
+            f"{label} divides by distances of all pairs, but beads, attachment points and spare nodes of filaments "
+            "that grow may be where nodes are. Leave them out: capsule_contact_force and crosslinks need none."
         )
 
 
