@@ -19,6 +19,7 @@ import scipy
 from ..errors import InputError
 from ..filaments.beam_refusals import refuse_beams
 from ..filaments.collection import FilamentCollection
+from ..filaments.growth_refusals import refuse_growth
 from ..units.quantities import LENGTH, in_units_of, positive
 from ..units.types import BoolArray, BoxVectors, FloatArray, IntArray, Scalar, Vectors
 
@@ -244,6 +245,7 @@ class _Segments:
 
 def _chains_of(filaments):
     refuse_beams(filaments, "the search for crossings")
+    refuse_growth(filaments, "the search for crossings, which follows nodes by their numbers,")
     pairs = zip(filaments, filaments.node_indices)
     return [np.append(nodes, nodes[0]) if filament.closed else nodes for filament, nodes in pairs]
 

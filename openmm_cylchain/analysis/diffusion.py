@@ -10,7 +10,14 @@ import numpy as np
 from ..errors import InputError
 from ..units.quantities import TIME, positive, whole_number
 from ..units.types import FloatArray, Indices, IntArray, Scalar
-from .filament_shapes import center_of_segments, filament_curves, node_positions, normalized, refuse_rings
+from .filament_shapes import (
+    center_of_segments,
+    filament_curves,
+    node_positions,
+    normalized,
+    refuse_rings,
+    refuse_spare_nodes,
+)
 
 
 @dataclass(frozen=True)
@@ -66,6 +73,7 @@ def mean_square_displacement(
     MeanSquareDisplacement
     """
     refuse_rings(trajectory, filaments, "axis")
+    refuse_spare_nodes(trajectory, filaments, "displacements of the same nodes")
     lags = _checked_lags(lags, trajectory.n_frames)
     step = _frame_spacing(trajectory) if time_step is None else positive(time_step, TIME, "time_step")
     results = np.stack(

@@ -13,6 +13,7 @@ from ..engine_choice import available_engines, choose_engine
 from ..errors import ContactWarning, InputError
 from ..filaments.chain_type import ChainType
 from ..filaments.collection import FilamentCollection, require_filaments
+from ..filaments.grown import longest_segment
 from ..units.quantities import LENGTH, STIFFNESS, positive, thermal_energy, true_or_false, whole_number
 from ..units.types import Indices, Numbers, Scalar
 from .contacts import SAFE_BARRIER, filament_diameters, outside_particles, particle_diameters
@@ -191,16 +192,26 @@ def _ends_of_capsules(filaments, number):
 
 
 def _capsule_lengths(filaments, number):
+    # At rest; of a filament that grows, as it is at the start.
     filament = filaments[number]
+    if filament.type.segment_kind.straight:
+        return filament.type.segment_lengths(filament.segments, filament.closed)
     lengths = filament.type.segment_lengths(filament.segments, filament.closed)
     return lengths * (filament.segments / (len(_ends_of_capsules(filaments, number)) - (not filament.closed)))
+
+
+def _longest_capsule(filaments, number):
+    filament = filaments[number]
+    if filament.growth is not None:
+        return longest_segment(filament.type, filament.growth)
+    return float(_capsule_lengths(filaments, number).max())
 
 
 def _check_box(system, filaments, diameter):
     a, b, c = default_box(system)
     volume = abs(np.dot(a, np.cross(b, c)))
     narrowest = min(volume / np.linalg.norm(np.cross(*pair)) for pair in ((b, c), (c, a), (a, b)))
-    longest = max(float(_capsule_lengths(filaments, number).max()) for number in range(len(filaments)))
+    longest = max(_longest_capsule(filaments, number) for number in range(len(filaments)))
     needed = 2.0 * (longest + diameter)
     if narrowest < needed:
         raise InputError(

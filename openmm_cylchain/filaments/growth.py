@@ -141,8 +141,7 @@ class Growth:
     pool : MonomerPool, or a concentration
         Filaments that are given the same pool share it.
     longest : length
-        For which the filament has nodes. An end that has no node left waits: ``FilamentGrowth.waited`` counts
-        how often.
+        For which the filament has nodes. An end without a node left waits: ``FilamentGrowth.waited`` counts how often.
     shortest : length, optional
         To which it shrinks at most; half a segment if not given.
     plus_capped, minus_capped : bool
@@ -267,7 +266,7 @@ def _shortest_segment(filament_type, growth, fewest):
     length = growth.monomers.length
     for monomers in range(1, fewest + 1):
         try:
-            _segment_type(filament_type, monomers * length)
+            segment_of_length(filament_type, monomers * length)
         except InputError as error:
             if monomers == fewest:
                 raise InputError(
@@ -279,8 +278,11 @@ def _shortest_segment(filament_type, growth, fewest):
     raise AssertionError("The loop returns or raises.")
 
 
-def _segment_type(filament_type, length):
-    # Of the same material: one that has the stiffness of a segment gets that of its material.
+def segment_of_length(filament_type: FilamentType, length: float) -> FilamentType:
+    """The type of a segment of another length in nm, of the same material; InputError if it has no friction.
+
+    Of a type that has the stiffness of a segment, that of its material.
+    """
     modulus = filament_type.segment_stiffness * filament_type.segment_length
     material = replace(filament_type, stretching_stiffness=None, stretching_modulus=modulus)
     return material.with_segment_length(length)
@@ -299,7 +301,7 @@ def segments_by_monomers(
     rows = []
     for monomers in range(1, 2 * per_segment + 1):
         length = monomers * growth.monomers.length
-        own = _segment_type(filament_type, max(monomers, least) * growth.monomers.length)
+        own = segment_of_length(filament_type, max(monomers, least) * growth.monomers.length)
         friction = own.segment_friction(viscosity, temperature, 1)
         extension = 0.0 if filament_type.maximum_extension is None else own.maximum_extension
         stiffness = own.segment_stiffness

@@ -1,6 +1,6 @@
 """The CylinderChainBindingForce of a System: linkers of the compiled engine."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -11,6 +11,7 @@ from ..couplings.beam_curves import BeamCurves
 from ..engine_choice import load_plugin
 from ..errors import InputError
 from ..filaments.filament import Filament
+from ..filaments.grown import rest_lengths
 from ..mechanics.geometry import to_nearest_images
 from ..units.quantities import require_kind, thermal_energy
 from ..units.types import FloatArray, IntArray
@@ -123,7 +124,7 @@ def _add_hand(force, hand, filaments, name):
             f"Linkers {name!r}: a hand binds to filaments of the type {' or '.join(hand.binds_to)}, of which there are "
             f"none among {', '.join(types)}: change its binds_to."
         )
-    longest = max(contour_of(filament)[-1] for filament in filaments if hand.binds(filament.type))
+    longest = max(_longest_contour(filament) for filament in filaments if hand.binds(filament.type))
     if hand.site_spacing is not None and hand.site_spacing > longest * (1.0 + 1e-9):
         raise InputError(
             f"Linkers {name!r}: a hand has no sites, {hand.site_spacing:g} nm apart, on filaments of {longest:g} nm: "
@@ -136,6 +137,10 @@ def _add_hand(force, hand, filaments, name):
     force.setHandWalking(number, hand.speed, hand.stall_force or 0.0, hand.walks_backward, hand.at_end == "hold")
     force.setHandSiteSpacing(number, hand.site_spacing or 0.0)
     return number
+
+
+def _longest_contour(filament):
+    return contour_of(filament)[-1] if filament.growth is None else filament.growth.longest
 
 
 def _anchor_points(linkers, positions):
@@ -200,10 +205,11 @@ def pulls_of(
     positions: FloatArray,
     box: FloatArray | None,
     curves: BeamCurves | None = None,
+    monomers: Mapping[int, IntArray] | None = None,
 ) -> LinkerPulls:
     """What the springs of linkers do; arguments are those of ``places_of``."""
     pulling = table.held == 2
-    places = places_of(force, table, filaments, nodes, positions, box, curves)[pulling]
+    places = places_of(force, table, filaments, nodes, positions, box, curves, monomers)[pulling]
     vectors = places[:, 1] - places[:, 0]
     distance = np.linalg.norm(vectors, axis=1)
     parameters = np.array([force.getLinkerTypeParameters(i)[2:4] for i in range(force.getNumLinkerTypes())])
@@ -222,22 +228,26 @@ def places_of(
     positions: FloatArray,
     box: FloatArray | None,
     curves: BeamCurves | None = None,
+    monomers: Mapping[int, IntArray] | None = None,
 ) -> FloatArray:
     """Where the two ends of linkers hold something: (n, 2, 3) in nm, NaN where they do not.
 
     By the particles of the nodes of each filament, all positions in nm, and the curves of beam elements. In a box,
-    (3, 3), a second end is at the nearest image of its first one.
+    (3, 3), a second end is at the nearest image of its first one. Of filaments that grow, the first monomer and that
+    behind the last one, by their numbers.
     """
     places = np.full((len(table), 2, 3), np.nan)
     chains, along = np.asarray(table.filaments), np.asarray(table.arc_lengths)
-    contours = [contour_of(filament) for filament in filaments]
-    minus = np.concatenate([own[: filament.segments] for filament, own in zip(filaments, nodes)])
-    plus = np.concatenate([np.roll(own, -1)[: filament.segments] for filament, own in zip(filaments, nodes)])
+    contours = [_present_contour(filament, (monomers or {}).get(i)) for i, filament in enumerate(filaments)]
+    counts = [len(contour) - 1 for contour in contours]
+    minus = np.concatenate([own[:count] for count, own in zip(counts, nodes)])
+    plus = np.concatenate([np.roll(own, -1)[:count] for count, own in zip(counts, nodes)])
     # Of all filaments, one behind the other.
-    begins = np.cumsum([0.0, *(contour[-1] for contour in contours)])
+    ends = np.cumsum([0.0, *(contour[-1] - contour[0] for contour in contours)])
+    begins = np.array([end - contour[0] for end, contour in zip(ends, contours)])
     starts = np.concatenate([begin + contour[:-1] for begin, contour in zip(begins, contours)])
     sizes = np.concatenate([np.diff(contour) for contour in contours])
-    first = np.cumsum([0, *(filament.segments for filament in filaments)])
+    first = np.cumsum([0, *counts])
     for side in (0, 1):
         on = chains[:, side] >= 0
         chain = chains[on, side]
@@ -248,8 +258,8 @@ def places_of(
         own = positions[minus[segment]] + fraction[:, None] * between
         if curves is not None:
             rows = np.flatnonzero(curves.on_curve(minus[segment], plus[segment]))
-            ends = minus[segment[rows]], plus[segment[rows]]
-            own[rows] = curves.places(*ends, fraction[rows], positions, box)
+            joined = minus[segment[rows]], plus[segment[rows]]
+            own[rows] = curves.places(*joined, fraction[rows], positions, box)
         places[on, side] = own
     for row in np.flatnonzero(np.asarray(table.anchors) >= 0):
         particle, point = force.getAnchor(int(table.anchors[row]))
@@ -257,6 +267,15 @@ def places_of(
     both = table.held == 2
     places[both, 1] = places[both, 0] + _nearest(places[both, 1] - places[both, 0], box)
     return places
+
+
+def _present_contour(filament, monomers):
+    # Lengths along a filament that grows are from where its minus end was at the start.
+    if monomers is None:
+        return contour_of(filament)
+    length = filament.growth.monomers.length
+    sizes = rest_lengths(monomers, filament.growth.monomers_per_segment(filament.type), length)
+    return monomers[0] * length + np.concatenate([[0.0], np.cumsum(sizes)])
 
 
 def _nearest(vectors, box):

@@ -10,9 +10,10 @@ from openmm import unit
 
 from ..engine_choice import load_plugin
 from ..filaments.filament import Filament
+from ..filaments.grown import count_nodes_of_monomers
 from ..filaments.growth import joints_by_monomers, segments_by_monomers
 from ..units.quantities import AVOGADRO, LENGTH, NUMBER_DENSITY
-from ..units.types import FloatArray, IntArray
+from ..units.types import IntArray
 
 GROWTH_FORCE_NAME = "Growth"
 
@@ -113,29 +114,9 @@ def growth_of(context: openmm.Context, filaments: Sequence[Filament]) -> Filamen
         np.array(numbers),
         monomers,
         (monomers[:, 1] - monomers[:, 0]) * per_monomer * LENGTH,
-        count_nodes(monomers, per_segment),
+        count_nodes_of_monomers(monomers, per_segment),
         counts[:, :, 0],
         counts[:, :, 1],
         counts[:, :, 2],
         unit.Quantity(molar, NUMBER_DENSITY * unit.mole).in_units_of(unit.molar),
     )
-
-
-def count_nodes(monomers: IntArray, per_segment: IntArray | int) -> IntArray:
-    """How many nodes filaments have with the monomers (..., 2) from a first one to before another.
-
-    Joints are at multiples of the monomers of a segment, with half of these or more beyond the last joint at an end.
-    """
-    least = np.asarray(per_segment) // 2
-    first = -((-(monomers[..., 0] + least)) // per_segment)
-    last = (monomers[..., 1] - least) // per_segment
-    return np.maximum(0, last - first + 1) + 2
-
-
-def rest_lengths(monomers: FloatArray, per_segment: int, monomer_length: float) -> FloatArray:
-    """Rest lengths (segments,) in nm of a filament with the monomers from a first one to before another."""
-    first, last = monomers
-    nodes = int(count_nodes(np.asarray(monomers), per_segment))
-    joint = -((-(first + per_segment // 2)) // per_segment)
-    joints = per_segment * (joint + np.arange(nodes - 2))
-    return monomer_length * np.diff(np.concatenate([[first], joints, [last]]))

@@ -15,6 +15,7 @@ from ..engines.protocol import Engine, PlacedFilaments
 from ..errors import InputError
 from ..filaments.beam_refusals import refuse_beams
 from ..filaments.filament import Tether
+from ..filaments.growth_refusals import refuse_growth
 from ..kinetics.binding_force import (
     find_binding_force,
     naming_unknown_linkers,
@@ -136,6 +137,7 @@ class FilamentsInContext:
         """
         filaments, nodes = self._placed.filaments, self._placed.node_indices
         refuse_beams(filaments, "instantaneous tensions of joints")
+        refuse_growth(filaments, "instantaneous tensions of joints", "Ask for mean_joint_tensions.")
         state = self._context.getState(positions=True, forces=True)
         positions = state.getPositions(asNumpy=True)._value
         forces = state.getForces(asNumpy=True)._value
@@ -274,7 +276,11 @@ class FilamentsInContext:
         positions = state.getPositions(asNumpy=True)._value
         box = state.getPeriodicBoxVectors(asNumpy=True)._value if force.usesPeriodicBoundaryConditions() else None
         table, curves = self.linkers(), BeamCurves.of_system(self._context.getSystem())
-        return force, table, self._placed.filaments, self._placed.node_indices, positions, box, curves
+        filaments, monomers = self._placed.filaments, None
+        if any(filament.growth is not None for filament in filaments):
+            growth = self.growth()
+            monomers = dict(zip(growth.filaments.tolist(), growth.monomers))
+        return force, table, filaments, self._placed.node_indices, positions, box, curves, monomers
 
     def _binding_force(self):
         force = find_binding_force(self._context.getSystem())

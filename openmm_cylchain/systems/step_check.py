@@ -42,6 +42,7 @@ import openmm
 
 from ..engine_choice import default_scheme
 from ..errors import InputError, InstabilityError
+from ..filaments.growth_refusals import refuse_growth
 from ..kinetics.binding_force import find_binding_force
 from ..mechanics.flow import Flow
 from ..time_steps.recommended_step import recommended_time_step
@@ -138,8 +139,9 @@ def check_time_step(
     Raises
     ------
     InputError
-        At a temperature of zero, or as ``Filaments.create_integrator``.
+        At a temperature of zero, for filaments that grow, or as ``Filaments.create_integrator``.
     """
+    refuse_growth(filaments, "the check of a step, which compares the same nodes in two runs,")
     step = as_step(step_size)
     scheme = default_scheme(filaments.engine) if scheme is None else scheme
     check_scheme(scheme)

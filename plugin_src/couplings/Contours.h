@@ -9,8 +9,8 @@
 namespace cylchain {
 
 /**
- * Lengths along chains, from their minus ends or where these were before they grew, with segments at rest; and where such
- * lengths are.
+ * Lengths along chains, from their minus ends or where these were before they grew, with segments at rest; and where
+ * such lengths are.
  *
  * Segments of all chains are numbered in the order of the list of chains. Those of beam elements are the elements, on
  * the curves of which lengths are.

@@ -49,6 +49,10 @@ static void testDivision() {
             }
 }
 
+static mt19937_64 generatorOf(int seed) {
+    return mt19937_64(seed);
+}
+
 /** A number drawn by a density on a grid. */
 template <class Density> static double drawFrom(Density density, double from, double to, mt19937_64& generator) {
     const int count = 1000;
@@ -87,8 +91,8 @@ struct Weights {
     }
     double meanBending(double stiffness) const {
         double sum = 0, norm = 0;
-        for (double angle = 5e-5; angle < M_PI; angle += 1e-4) {
-            const double weight = ofAngle(stiffness, angle);
+        for (int i = 0; i < 31415; i++) {
+            const double angle = 1e-4*(i+0.5), weight = ofAngle(stiffness, angle);
             sum += weight*bendingByHand(bending, stiffness, angle);
             norm += weight;
         }
@@ -96,9 +100,8 @@ struct Weights {
     }
     double meanStretching(const Segment& segment) const {
         double sum = 0, norm = 0;
-        const double width = 1e-4*segment.restLength;
-        for (double extension = -segment.restLength; extension < segment.restLength; extension += width) {
-            const double weight = ofExtension(segment, extension);
+        for (int i = -10000; i < 10000; i++) {
+            const double extension = 1e-4*i*segment.restLength, weight = ofExtension(segment, extension);
             if (weight > 0) {
                 sum += weight*stretchingByHand(segment, stretching, extension);
                 norm += weight;
@@ -192,7 +195,7 @@ static void checkMean(double expected, const Mean& found, double power, const st
 /** Rates, and energies of lengths and bends, of chains that have grown and shrunk, at a step of so many events. */
 static void checkFreeEnds(const Weights& weights, double events) {
     const int number = 3000;
-    mt19937_64 generator(5);
+    mt19937_64 generator = generatorOf(5);
     Growing all;
     all.system.tables = {makeTable(hasRange(weights.stretching))};
     all.system.pools = {{0.02, 0}};
@@ -259,7 +262,7 @@ static void testFreeEnds() {
 /** One segment that grows against a wall in the direction that it has: the number of its monomers. */
 static void checkRodBeforeWall(double events) {
     const double distance = 28, stiffness = 5, z = 3;
-    mt19937_64 generator(3);
+    mt19937_64 generator = generatorOf(3);
     Growing all;
     all.system.tables = {makeTable(false, 2)};
     all.system.pools = {{0.01, 0}};
@@ -286,7 +289,8 @@ static void checkRodBeforeWall(double events) {
     for (int m = 2; m < 18; m++) {
         const Segment& segment = all.system.tables[0].getSegment(m);
         double sum = 0, norm = 0;
-        for (double extension = -segment.restLength; extension < 2*segment.restLength; extension += 1e-3) {
+        for (int i = -10000; i < 20000; i++) {
+            const double extension = 1e-4*i*segment.restLength;
             const double depth = max(0.0, segment.restLength+extension-distance);
             const double weight = weights.ofExtension(segment, extension);
             norm += weight;
@@ -326,7 +330,7 @@ static void testRodBeforeWall() {
 
 /** Two chains share a pool that runs dry. */
 static void testPool() {
-    mt19937_64 generator(4);
+    mt19937_64 generator = generatorOf(4);
     Growing all;
     all.system.tables = {makeTable(false)};
     all.system.pools = {{0, 1000}};
@@ -370,7 +374,7 @@ static void testPool() {
 static void testOrder() {
     const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
     auto grown = [&] (int number) {
-        mt19937_64 generator(4);
+        mt19937_64 generator = generatorOf(4);
         Growing all;
         all.system.tables = {makeTable(false)};
         all.system.pools = {{0.02, 0}};
@@ -401,7 +405,7 @@ static double energyOfContacts(const ContactBodies& bodies, const Array& x, doub
 
 /** The change at an end is that of the energy of all contacts. */
 static void testContacts() {
-    mt19937_64 generator(8);
+    mt19937_64 generator = generatorOf(8);
     normal_distribution<double> normal;
     int touching = 0, passing = 0;
     for (int round = 0; round < 4000; round++) {
@@ -485,14 +489,15 @@ static void testContacts() {
         contacts.accept(change);
         const EndChange back = {chain, end, after, nodes[chain], kind == 1 ? 2 : 1, kind == 2 ? 2 : 1,
                 {}, {}, 0.6};
-        checkClose(-difference, contacts.findChange(back), 1+fabs(energy), 1e-9, "the contacts of an end that goes back");
+        checkClose(-difference, contacts.findChange(back), 1+fabs(energy), 1e-9,
+                "the contacts of an end that goes back");
     }
     check(touching > 700 && passing > 50, "too few contacts: "+to_string(touching)+", "+to_string(passing));
 }
 
 /** The change at an end is that of the energy of all links, whose places stay where they are along chains. */
 static void testLinks() {
-    mt19937_64 generator(8);
+    mt19937_64 generator = generatorOf(8);
     normal_distribution<double> normal;
     uniform_real_distribution<double> uniform;
     int moved = 0;
@@ -599,7 +604,7 @@ static void testLinks() {
 
 /** A tip does not jump over what is in its way, and a rod that grows towards another one stops before it. */
 static void testRodInTheWay() {
-    mt19937_64 generator(3);
+    mt19937_64 generator = generatorOf(3);
     Growing all;
     all.system.tables = {makeTable(false)};
     all.system.pools = {{0.01, 0}};

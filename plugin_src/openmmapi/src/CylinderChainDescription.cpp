@@ -85,7 +85,8 @@ void CylinderChainDescription::update(const CylinderChainForce& force) {
     for (int i = 0; i < present.size(); i++) {
         if (growing.count(i) > 0) {
             if (!present.getChain(i).tethers.empty())
-                throw OpenMMException("updateParametersInContext: Chain "+to_string(i)+" grows, and cannot be tethered");
+                throw OpenMMException("updateParametersInContext: Chain "+to_string(i)+
+                        " grows, and cannot be tethered");
             present.getChain(i) = chains.getChain(i);
             continue;
         }

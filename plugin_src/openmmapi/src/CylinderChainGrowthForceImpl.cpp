@@ -166,10 +166,12 @@ void CylinderChainGrowthForceImpl::updateContextState(ContextImpl& context, bool
     const CylinderChainIntegrator& integrator = dynamic_cast<const CylinderChainIntegrator&>(context.getIntegrator());
     GrowthStep step = {BOLTZ*integrator.getTemperature(), size, seed};
     vector<Surroundings*> felt;
+    felt.reserve(around.size());
     for (const Felt& own : around)
         felt.push_back(own.surroundings.get());
     ChainList& list = chains->getGrowingList();
     vector<int> numNodes, changed;
+    numNodes.reserve(growing.size());
     for (int chain : growing)
         numNodes.push_back(list.getNumNodes(chain));
     int failed = -1;

@@ -46,7 +46,8 @@ public:
     /**
      * Get a table.
      */
-    void getTable(int table, int& monomersPerSegment, std::vector<double>& parameters, std::vector<double>& loads) const;
+    void getTable(int table, int& monomersPerSegment, std::vector<double>& parameters,
+            std::vector<double>& loads) const;
     /**
      * Get the number of pools.
      */

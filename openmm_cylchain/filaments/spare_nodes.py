@@ -1,0 +1,50 @@
+"""Spare nodes of filaments that grow: particles behind the last node, and exactly where it is."""
+
+import numpy as np
+
+from ..errors import InputError
+from ..units.quantities import LENGTH, in_units_of
+from ..units.types import FloatArray, IntArray, Vectors
+
+_ROUNDING = 8.0
+"""By how many of its last digits the place of a spare node may differ: programs rotate and shift trajectories."""
+
+
+def count_nodes(positions: Vectors) -> IntArray:
+    """How many nodes a filament that grows has in each frame: its other particles are where the last node is.
+
+    Parameters
+    ----------
+    positions : (frames, n, 3) or (n, 3) length
+        Of all particles of one filament.
+
+    Returns
+    -------
+    (frames,) int array, or an int
+        At least 2.
+
+    Raises
+    ------
+    InputError
+        For another shape, or fewer than two particles.
+    """
+    kind = np.asarray(getattr(positions, "_value", positions)).dtype
+    places = np.asarray(in_units_of(positions, LENGTH, "positions"))
+    if places.ndim not in (2, 3) or places.shape[-1] != 3 or places.shape[-2] < 2:
+        raise InputError(f"positions must have the shape (frames, n, 3) with n from 2 on, but have {places.shape}.")
+    precision = np.finfo(kind if kind.kind == "f" else float).eps
+    tolerance = _ROUNDING * precision * np.abs(places).max(axis=(-2, -1), initial=0.0)
+    apart = np.abs(places - places[..., -1:, :]).max(axis=-1) > tolerance[..., None]
+    # The last node is behind the last particle that is elsewhere.
+    elsewhere = places.shape[-2] - np.argmax(apart[..., ::-1], axis=-1)
+    nodes: IntArray = np.where(apart.any(axis=-1), elsewhere + 1, 2)
+    return nodes
+
+
+def without_spare_nodes(positions: FloatArray) -> FloatArray:
+    """Positions (frames, n, 3) of one filament with NaN in the place of its spare nodes; as they are without any."""
+    counts = count_nodes(positions)
+    if np.all(counts == positions.shape[1]):
+        return positions
+    spare = np.arange(positions.shape[1]) >= counts[:, None]
+    return np.where(spare[..., None], np.nan, positions)
