@@ -13,6 +13,7 @@ from ..units.quantities import (
     AVOGADRO,
     LENGTH,
     NUMBER_DENSITY,
+    ON_RATE,
     RATE,
     VOLUME,
     in_units_of,
@@ -23,9 +24,6 @@ from ..units.quantities import (
 )
 from ..units.types import FloatArray, Scalar
 from .filament_type import FilamentType
-
-ON_RATE = VOLUME * RATE
-"""Unit of the rates of monomers that come, per number of free ones in a volume."""
 
 _PER_AMOUNT = unit.liter / unit.mole / unit.second
 _SAME_LENGTH = 1e-6
@@ -143,7 +141,8 @@ class Growth:
     pool : MonomerPool, or a concentration
         Filaments that are given the same pool share it.
     longest : length
-        For which the filament has nodes. An end without a node left waits: ``FilamentGrowth.waited`` counts how often.
+        For which the filament has nodes. An end that has no node left waits: ``FilamentGrowth.waited`` counts
+        how often.
     shortest : length, optional
         To which it shrinks at most; half a segment if not given.
     plus_capped, minus_capped : bool

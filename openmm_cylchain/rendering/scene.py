@@ -111,7 +111,7 @@ class Scene:
         values = None if self.scale is None else _values(self.run, self.look, self._director, frame)
         colors = filament_colors(self.run)
         for number, (own, points) in enumerate(zip(self.run.filaments, self.run.curves(frame))):
-            ends = np.stack([points, np.roll(points, -1, axis=0)], axis=1)[: own.segments * own.pieces]
+            ends = np.stack([points, np.roll(points, -1, axis=0)], axis=1)[: len(points) - (not own.ring)]
             color = np.tile(_rgb(colors[own.label]), (len(ends), 1))
             if self.scale is not None and values is not None:
                 color = self.scale.colors(values[number])

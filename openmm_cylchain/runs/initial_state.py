@@ -3,7 +3,7 @@
 It calls what users call from Python: methods of ``Filaments`` and ``Crosslinks``, ``capsule_contact_force`` and others.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import openmm
@@ -20,6 +20,7 @@ from ..couplings.walls import filament_wall_force, wall_force
 from ..errors import InputError
 from ..filaments import shapes
 from ..filaments.attachments import lengths_along
+from ..filaments.growth import Monomers
 from ..filaments.segment_place import SegmentPlace
 from ..systems.filaments import Filaments
 from ..theory import chain_mean_square_end_to_end
@@ -49,7 +50,7 @@ class BuiltSystem:
         return {"particle_friction": self.particle_friction, "flow": self.flow}
 
 
-def build_system(configuration, engine, seed, linkers=True):
+def build_system(configuration, engine, seed, kinetics=True):
     """The System of a configuration.
 
     Parameters
@@ -57,21 +58,21 @@ def build_system(configuration, engine, seed, linkers=True):
     engine : {"compiled", "portable"} or None
     seed : int
         Of random places and shapes.
-    linkers : bool
-        Whether to have those.
+    kinetics : bool
+        Whether to have linkers, and monomers that come and go.
 
     Returns
     -------
     BuiltSystem
     """
     try:
-        return _built(configuration, engine, seed, linkers)
+        return _built(configuration, engine, seed, kinetics)
     except ConfigurationError as error:
         raise error.with_line(configuration.lines) from None
 
 
-def _built(configuration, engine, seed, linkers):
-    filaments = place_filaments(configuration, engine, seed, linkers)
+def _built(configuration, engine, seed, kinetics):
+    filaments = place_filaments(configuration, engine, seed, kinetics)
     topology, system, positions = filaments.build(box_vectors(configuration.box))
     positions, spheres, radii, friction = _add_particles(configuration, seed, topology, system, positions)
     count = _add_links(configuration, filaments, system, seed)
@@ -107,6 +108,7 @@ def stands_alone(configuration):
         or configuration.tethers
         or configuration.particles
         or configuration.flow
+        or any(own.growth is not None for own in configuration.filaments)
     )
 
 
@@ -124,7 +126,7 @@ def recommended_step(configuration, scheme, engine, seed):
     return built.filaments.recommended_time_step(scheme, system=built.system, **built.arguments())
 
 
-def place_filaments(configuration, engine, seed, linkers=True):
+def place_filaments(configuration, engine, seed, kinetics=True):
     """Filaments with their initial positions, tethers and linkers.
 
     Filaments without a position are laid out side by side on a grid in the xy plane, centred on the origin, for the eye
@@ -152,7 +154,7 @@ def place_filaments(configuration, engine, seed, linkers=True):
             nodes, control_points = _nodes(*own, planar if group.planar else None)
             if planar is not None and group.planar:
                 planar.add(number, nodes, group.closed)
-            _add(filaments, group, nodes, control_points)
+            _add(filaments, group, nodes, control_points, kinetics)
     if configuration.contacts is not None:
         for number, filament in enumerate(filaments):
             if not filament.type.segment_kind.straight:
@@ -162,7 +164,7 @@ def place_filaments(configuration, engine, seed, linkers=True):
         for number in own.filaments:
             point = filaments[number].positions[own.node] if own.point is None else own.point
             filaments.add_tether(number, own.node, point, own.stiffness)
-    for own in configuration.linkers if linkers else ():
+    for own in configuration.linkers if kinetics else ():
         anchors = None if own.anchors is None else np.array(own.anchors)
         # What is within reach of an anchor is known when overlaps have come apart: see ``relaxation``.
         later = anchors is not None and configuration.relaxes
@@ -183,7 +185,10 @@ def box_vectors(box):
     return None if box is None else np.diag(box)
 
 
-def _add(filaments, group, nodes, control_points):
+def _add(filaments, group, nodes, control_points, kinetics):
+    growth = group.growth
+    if growth is not None and not kinetics:
+        growth = replace(growth, monomers=Monomers(length=growth.monomers.length))
     filaments.add_nodes(
         group.type,
         nodes,
@@ -193,6 +198,7 @@ def _add(filaments, group, nodes, control_points):
         clamped_tangents=group.clamped_tangents,
         planar=group.planar,
         propulsion=group.propulsion,
+        growth=growth,
     )
 
 
