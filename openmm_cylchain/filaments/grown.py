@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..errors import InputError
@@ -11,9 +9,6 @@ from ..mechanics.geometry import segment_vectors
 from ..units.types import FloatArray, IntArray
 from .filament_type import FilamentType
 from .growth import Growth, segment_of_length
-
-if TYPE_CHECKING:
-    from .filament import Filament
 
 
 def count_nodes_of_monomers(monomers: IntArray, per_segment: IntArray | int) -> IntArray:
@@ -51,22 +46,66 @@ def longest_segment(filament_type: FilamentType, growth: Growth) -> float:
     return most * growth.monomers.length
 
 
-def energies_of_grown(filament: Filament, nodes: FloatArray, monomers: IntArray) -> tuple[float, float]:
-    """Stretching and bending energy in kJ/mol of a filament that has grown, with all of its particles (n, 3) in nm."""
-    kind, growth = filament.type, filament.growth
-    assert isinstance(kind, FilamentType) and growth is not None
-    numbers = monomers_of_segments(monomers, growth.monomers_per_segment(kind))
-    if len(nodes) <= len(numbers):
-        raise InputError(f"{len(numbers)} segments have {len(numbers) + 1} nodes, but there are {len(nodes)}.")
-    vectors = segment_vectors(nodes[: len(numbers) + 1], False)
-    lengths = np.linalg.norm(vectors, axis=1)
-    stretching = 0.0
-    for number in np.unique(numbers):
-        own = segment_of_length(kind, int(number) * growth.monomers.length)
-        stretching += float(np.sum(own.stretching_energy(lengths[numbers == number])))
-    if len(numbers) < 2:
-        return stretching, 0.0
-    means = 0.5 * growth.monomers.length * (numbers[1:] + numbers[:-1])
-    found, which = np.unique(means, return_inverse=True)
-    stiffnesses = np.array([kind.stiffness_of_joint(float(length)) for length in found])[which]
-    return stretching, float(np.sum(kind.bending_energies(vectors, stiffnesses)))
+class GrownChain:
+    """The segments of a filament that has grown.
+
+    Parameters
+    ----------
+    kind : FilamentType
+    monomer_length : float
+        In nm.
+    monomers : (2,) int array
+        The number of the first monomer, and that behind the last one.
+    particles : (n, 3) array
+        All of its particles in nm, the nodes first.
+    """
+
+    def __init__(self, kind: FilamentType, monomer_length: float, monomers: IntArray, particles: FloatArray) -> None:
+        self._kind, self._monomer_length = kind, monomer_length
+        self._numbers = monomers_of_segments(monomers, round(kind.segment_length / monomer_length))
+        nodes = len(self._numbers) + 1
+        if len(particles) < nodes:
+            raise InputError(f"{nodes} nodes are needed for so many monomers, but there are {len(particles)}.")
+        self._vectors = segment_vectors(particles[:nodes], False)
+        self._lengths = np.linalg.norm(self._vectors, axis=1)
+
+    @property
+    def nodes(self) -> int:
+        """How many nodes it has."""
+        return len(self._numbers) + 1
+
+    @property
+    def energies(self) -> tuple[float, float]:
+        """Of stretching and bending in kJ/mol."""
+        stretching = sum(float(np.sum(own.stretching_energy(self._lengths[which]))) for own, which in self._types)
+        if len(self._numbers) < 2:
+            return stretching, 0.0
+        return stretching, float(np.sum(self._kind.bending_energies(self._vectors, self._stiffnesses)))
+
+    @property
+    def tensions(self) -> FloatArray:
+        """Of its segments (segments,) in kJ/(mol nm)."""
+        tensions = np.empty(len(self._numbers))
+        for own, which in self._types:
+            tensions[which] = own.stretching_derivative(self._lengths[which])
+        return tensions
+
+    @property
+    def virial(self) -> FloatArray:
+        """As that of ``SegmentKind.virial``."""
+        pulls = (self.tensions / self._lengths)[:, None] * self._vectors
+        if len(self._numbers) > 1:
+            pulls -= self._kind.bending_end_forces(self._vectors, self._stiffnesses)
+        return np.einsum("ni,nj->ij", self._vectors, pulls)
+
+    @property
+    def _types(self):
+        # Those that there are, and which segments are of each.
+        found = [(int(number), self._numbers == number) for number in np.unique(self._numbers)]
+        return [(segment_of_length(self._kind, number * self._monomer_length), which) for number, which in found]
+
+    @property
+    def _stiffnesses(self):
+        sums, which = np.unique(self._numbers[1:] + self._numbers[:-1], return_inverse=True)
+        length = 0.5 * self._monomer_length
+        return np.array([self._kind.stiffness_of_joint(length * float(both)) for both in sums])[which]

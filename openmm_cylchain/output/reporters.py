@@ -20,7 +20,7 @@ import openmm
 from ..errors import InputError
 from ..filaments.beam_refusals import refuse_beams
 from ..filaments.collection import FilamentCollection, require_filaments
-from ..filaments.grown import energies_of_grown
+from ..filaments.grown import GrownChain
 from ..filaments.growth_refusals import refuse_growth
 from ..mechanics.redistribution import ChainSet
 from ..mechanics.tension import axial_tensions, filament_tensions
@@ -187,7 +187,7 @@ def _describe(filament, nodes, control_points, temperature, monomers):
     if monomers is None:
         energies = filament.energies(nodes, control_points, temperature)
     else:
-        energies = energies_of_grown(filament, nodes, monomers)
+        energies = GrownChain(filament.type, filament.growth.monomers.length, monomers, nodes).energies
     end_to_end_distance = 0.0 if filament.closed else np.linalg.norm(nodes[-1] - nodes[0])
     lengths = filament.type.segment_kind.lengths(nodes, control_points, filament.closed)
     return *energies, end_to_end_distance, lengths.sum()

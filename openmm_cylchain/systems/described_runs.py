@@ -80,6 +80,7 @@ def describe_system(
                 tuple(controls.tolist()),
                 tuple(own.clamped_tangents),
                 own.planar,
+                monomer_length=0.0 if own.growth is None else own.growth.monomers.length,
             )
             for own, nodes, controls in zip(filaments, filaments.node_indices, filaments.control_point_indices)
         ),
