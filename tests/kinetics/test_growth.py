@@ -152,7 +152,7 @@ def test_other_kinds_of_filaments_do_not_grow():
     beads = BeadSpringType(
         name="BSP", diameter=2.0, bead_spacing=0.5, bead_friction=1e3, stretching_modulus=600.0, bending_rigidity=120.0
     )
-    beam = replace(KIND, element="beam")
+    beam = replace(KIND, element="beam", extension_relaxation_time=None)
     for add in (
         lambda: filaments.add_ring(KIND, 8, [0, 0, 0], growth=growth()),
         lambda: filaments.add_nodes(KIND, 54.0 * np.eye(4, 3), closed=True, growth=growth()),
