@@ -114,8 +114,8 @@ def refuse_spare_nodes(trajectory: mdtraj.Trajectory, filaments: int | Indices |
         counts = count_nodes(own)
         if np.any(counts < own.shape[1]):
             raise InputError(
-                f"Filament {index} grows: it has {counts.min()} to {counts.max()} nodes, which come and go, and no "
-                f"{what}. Select the others."
+                f"Filament {index} grows: {counts.min()} to {counts.max()} of its {own.shape[1]} particles are nodes. "
+                f"They come and go, and it has no {what}: select the others."
             )
 
 

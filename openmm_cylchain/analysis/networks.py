@@ -156,7 +156,7 @@ def mesh_size(run: Run, volume: Scalar | None = None) -> float:
         Without a periodic box and a volume, and where filaments grow, whose length changes.
     """
     room = volume_of(run, volume)
-    if run.growth:
+    if any(own.monomer_length for own in run.filaments):
         raise InputError("Filaments grow, and the mesh size changes: take the lengths in Run.growth.")
     length = sum(float(own.type.segment_lengths(own.segments, own.ring).sum()) for own in run.filaments)
     return math.sqrt(3.0 * room / length)

@@ -198,15 +198,11 @@ class Run:
                     number = max(before, key=lambda i: own.filaments[i].nodes[0])
                     ends = 0 if own.filaments[number].ring else 1
                     filaments[particles] = number, (len(particles) - ends) // (len(own.filaments[number].nodes) - ends)
-        return [
-            DescribedContactFinder(
-                replace(contacts, chains=tuple((present.get(each, each), *rest) for each, *rest in contacts.chains)),
-                filaments,
-                own.particles,
-                self.box,
-            )
-            for contacts in own.contacts
+        there = [
+            replace(one, chains=tuple((present.get(chain[0], chain[0]), *chain[1:]) for chain in one.chains))
+            for one in own.contacts
         ]
+        return [DescribedContactFinder(contacts, filaments, own.particles, self.box) for contacts in there]
 
     def contacts(self, frame: int) -> ContactFrame:
         """Contacts of a frame, of all ``capsule_contact_force`` or ``[contacts]``: none if there is no such.
@@ -365,11 +361,12 @@ class Run:
     def _nodes_in(self, frame):
         # Particles of the nodes that filaments have in a frame.
         nodes = [own.nodes for own in self.filaments]
-        for number, chain in self._grown(frame).items():
+        for number, chain in self.grown(frame).items():
             nodes[number] = nodes[number][: chain.nodes]
         return nodes
 
-    def _grown(self, frame):
+    def grown(self, frame: int) -> dict[int, GrownChain]:
+        """What segments filaments that grow have in a frame, by the numbers of filaments."""
         monomers = self.monomers(frame)
         positions = self.positions(frame) if monomers else np.zeros((0, 3))
         chains = ((number, self.filaments[number], ends) for number, ends in monomers.items())
@@ -431,7 +428,7 @@ class Run:
             raise InputError("Segments of filaments that grow come and go: take tensions of single frames, average=1.")
         totals = [np.zeros(own.segments) for own in self.filaments]
         for each in frames:
-            positions, grown = self.positions(each), self._grown(each)
+            positions, grown = self.positions(each), self.grown(each)
             for number, own in enumerate(self.filaments):
                 parts = positions[own.nodes], positions[own.control_points]
                 if number in grown:
@@ -439,16 +436,6 @@ class Run:
                 else:
                     totals[number] += own.type.segment_kind.tensions(chain_of(own, self.temperature), *parts)
         return [total / len(frames) for total in totals]
-
-    def virials(self, frame: int) -> list[FloatArray]:
-        """The derivative of the energy of each filament by an affine strain in a frame: (3, 3) arrays in kJ/mol."""
-        positions, grown, virials = self.positions(frame), self._grown(frame), []
-        for number, own in enumerate(self.filaments):
-            parts = positions[own.nodes], positions[own.control_points]
-            kind = own.type.segment_kind
-            chain = grown.get(number)
-            virials.append(kind.virial(chain_of(own, self.temperature), *parts) if chain is None else chain.virial)
-        return virials
 
 
 def volume_of(run: Run, volume: Scalar | None) -> float:

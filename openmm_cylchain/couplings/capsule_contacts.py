@@ -203,7 +203,7 @@ def _capsule_lengths(filaments, number):
 def _longest_capsule(filaments, number):
     filament = filaments[number]
     if filament.growth is not None:
-        return longest_segment(filament.type, filament.growth)
+        return longest_segment(filament)
     return float(_capsule_lengths(filaments, number).max())
 
 

@@ -271,6 +271,7 @@ class Crosslinks:
             self._initial = self._initial.with_links(places, *parameters)
         elif len(places):
             _check_in_context(store, context, numbers[:1], np.array([parameters[1]]))
+            assert context is not None
             refuse_links_of_growing(context.getSystem(), places, numbers)
             store.add(context, places, parameters)
         return numbers

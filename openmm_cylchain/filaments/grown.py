@@ -7,8 +7,9 @@ import numpy as np
 from ..errors import InputError
 from ..mechanics.geometry import segment_vectors
 from ..units.types import FloatArray, IntArray
+from .filament import Filament
 from .filament_type import FilamentType
-from .growth import Growth, segment_of_length
+from .growth import segment_of_length
 
 
 def count_nodes_of_monomers(monomers: IntArray, per_segment: IntArray | int) -> IntArray:
@@ -33,11 +34,14 @@ def monomers_of_segments(monomers: IntArray, per_segment: int) -> IntArray:
 
 def rest_lengths(monomers: IntArray, per_segment: int, monomer_length: float) -> FloatArray:
     """Rest lengths (segments,) in nm of a filament with the monomers from a first one to before another."""
-    return monomer_length * monomers_of_segments(monomers, per_segment)
+    return np.asarray(monomer_length * monomers_of_segments(monomers, per_segment), dtype=float)
 
 
-def longest_segment(filament_type: FilamentType, growth: Growth) -> float:
-    """The longest rest length, in nm, that a segment of a filament that grows can have."""
+def longest_segment(filament: Filament) -> float:
+    """The longest rest length, in nm, that a segment of a filament can have, also as it grows."""
+    filament_type, growth = filament.type, filament.growth
+    if growth is None or not isinstance(filament_type, FilamentType):
+        return filament.type.segment_length
     per_segment = growth.monomers_per_segment(filament_type)
     least = per_segment // 2
     # Without a joint, both of its ends are at an end of the filament.

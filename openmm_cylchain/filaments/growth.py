@@ -22,7 +22,8 @@ from ..units.quantities import (
     require_kind,
     true_or_false,
 )
-from ..units.types import FloatArray, Scalar
+from ..units.types import FloatArray, Indices, Scalar
+from .chain_type import ChainType
 from .filament_type import FilamentType
 
 _PER_AMOUNT = unit.liter / unit.mole / unit.second
@@ -233,7 +234,9 @@ def _as_on_rate(rate, name):
     return non_negative(rate, ON_RATE, name)
 
 
-def check_growth(growth: Growth, filament_type: FilamentType, segments: int, closed: bool, clamped, label: str) -> int:
+def check_growth(
+    growth: Growth, filament_type: ChainType, segments: int, closed: bool, clamped: Indices, label: str
+) -> int:
     """The number of spare nodes of a filament that grows; InputError if it cannot."""
     require_kind(growth, Growth, f"{label}: growth")
     if not (isinstance(filament_type, FilamentType) and filament_type.segment_kind.straight) or closed:

@@ -6,12 +6,9 @@ from ..errors import InputError
 from ..units.quantities import LENGTH, in_units_of
 from ..units.types import FloatArray, IntArray, Vectors
 
-_ROUNDING = 8.0
-"""By how many of its last digits the place of a spare node may differ: programs rotate and shift trajectories."""
-
 
 def count_nodes(positions: Vectors) -> IntArray:
-    """How many nodes a filament that grows has in each frame: its other particles are where the last node is.
+    """How many nodes a filament that grows has in each frame: its other particles are where the last node is, exactly.
 
     Parameters
     ----------
@@ -20,7 +17,7 @@ def count_nodes(positions: Vectors) -> IntArray:
 
     Returns
     -------
-    (frames,) int array, or an int
+    (frames,) int array, without an axis for (n, 3)
         At least 2.
 
     Raises
@@ -28,13 +25,10 @@ def count_nodes(positions: Vectors) -> IntArray:
     InputError
         For another shape, or fewer than two particles.
     """
-    kind = np.asarray(getattr(positions, "_value", positions)).dtype
     places = np.asarray(in_units_of(positions, LENGTH, "positions"))
     if places.ndim not in (2, 3) or places.shape[-1] != 3 or places.shape[-2] < 2:
         raise InputError(f"positions must have the shape (frames, n, 3) with n from 2 on, but have {places.shape}.")
-    precision = np.finfo(kind if kind.kind == "f" else float).eps
-    tolerance = _ROUNDING * precision * np.abs(places).max(axis=(-2, -1), initial=0.0)
-    apart = np.abs(places - places[..., -1:, :]).max(axis=-1) > tolerance[..., None]
+    apart = np.any(places != places[..., -1:, :], axis=-1)
     # The last node is behind the last particle that is elsewhere.
     elsewhere = places.shape[-2] - np.argmax(apart[..., ::-1], axis=-1)
     nodes: IntArray = np.where(apart.any(axis=-1), elsewhere + 1, 2)

@@ -10,6 +10,7 @@ from openmm import unit
 
 from ..engine_choice import load_plugin
 from ..filaments.filament import Filament
+from ..filaments.filament_type import FilamentType
 from ..filaments.grown import count_nodes_of_monomers
 from ..filaments.growth import joints_by_monomers, segments_by_monomers
 from ..units.quantities import AVOGADRO, LENGTH, NUMBER_DENSITY
@@ -40,7 +41,7 @@ def make_growth_force(filaments: Sequence[Filament], viscosity: float, temperatu
     pools: dict[int, int] = {}
     for number, filament in enumerate(filaments):
         growth, kind = filament.growth, filament.type
-        if growth is None:
+        if growth is None or not isinstance(kind, FilamentType):
             continue
         per_segment = growth.monomers_per_segment(kind)
         key = (kind, growth.monomers.length, growth.fewest_monomers(kind), filament.propulsion)

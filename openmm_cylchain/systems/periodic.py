@@ -71,10 +71,7 @@ def make_whole(positions: Vectors, filaments: Filaments, box_vectors: BoxVectors
     vectors = _lattice(box_vectors, len(frames))
     for number, (filament, nodes) in enumerate(zip(filaments, filaments.node_indices)):
         label = filament_label(number, filament)
-        longest = filament.type.segment_length
-        if filament.growth is not None:
-            longest = longest_segment(filament.type, filament.growth)
-        _refuse_ambiguous(np.full((len(frames), 1), longest), vectors, f"{label} at rest")
+        _refuse_ambiguous(np.full((len(frames), 1), longest_segment(filament)), vectors, f"{label} at rest")
         frames[:, nodes] = _whole_chains(frames[:, nodes], vectors, label)
         control_points = filaments.control_point_indices[number]
         if len(control_points):
