@@ -1,5 +1,7 @@
 """Spare nodes of filaments that grow: particles behind the last node, and exactly where it is."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from ..errors import InputError
