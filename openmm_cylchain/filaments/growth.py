@@ -30,6 +30,7 @@ _PER_AMOUNT = unit.liter / unit.mole / unit.second
 _SAME_LENGTH = 1e-6
 """By what share the length of a segment may differ from that of its monomers."""
 _MOST_MONOMERS_OF_SEGMENT = 100_000
+_MOST_MONOMERS_OF_POOL = 1e15
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,7 +110,7 @@ class MonomerPool:
     Raises
     ------
     InputError
-        For a concentration that is negative, or a volume that is not positive.
+        For a concentration that is negative, a volume that is not positive, or 1e15 monomers or more in it.
     """
 
     concentration: float
@@ -123,6 +124,11 @@ class MonomerPool:
         object.__setattr__(self, "concentration", as_number_density(self.concentration, "concentration of monomers"))
         if self.volume is not None:
             object.__setattr__(self, "volume", positive(self.volume, VOLUME, "volume of a pool of monomers"))
+            if self.concentration * self.volume >= _MOST_MONOMERS_OF_POOL:
+                raise InputError(
+                    f"A pool of {self.concentration * self.volume:.3g} monomers has more than the "
+                    f"{_MOST_MONOMERS_OF_POOL:.0e} that are counted one by one: leave its volume out."
+                )
 
 
 @dataclass(frozen=True, kw_only=True)

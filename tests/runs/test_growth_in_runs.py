@@ -113,6 +113,7 @@ NAMED = MONOMERS + 'name = "other"\n'
         ("lacks its rates", (), {"monomers": NAMED.replace('type = "ACTIN_ATP"', 'length = "2 nm"')}),
         ("lacks the key 'length'", (), {"monomers": NAMED.replace('type = "ACTIN_ATP"', 'plus_off_rate = "2 1/s"')}),
         ("lacks the key 'concentration'", (), {"monomers": '[[monomers]]\ntype = "ACTIN_ATP"\n'}),
+        ("that are counted one by one", (), {"monomers": MONOMERS + 'volume = "1 m^3"\n'}),
         ("add a periodic [box]", (), {"monomers": MONOMERS + 'volume = "box"\n'}),
         ('whole number of monomers, as with segment_length = "99.9 nm"', (), {"filament": STILL + GROWTH}),
         ("lacks the key 'longest'", (), {"filament": FILAMENT + "growth = {}\n"}),
