@@ -23,6 +23,7 @@ from openmm_cylchain import (
     Growth,
     GrowthReporter,
     InputError,
+    InstabilityError,
     LinkerTable,
     MonomerPool,
     Monomers,
@@ -455,3 +456,13 @@ def test_a_context_by_default(tmp_path):
     still, system, positions = built(growing(0, still=1))
     with pytest.raises(InputError, match="No filaments grow"):
         still.in_context(in_context(still, system, positions)).growth()
+
+
+def test_positions_of_another_length(crowded):
+    """Segments of the present one have no place there."""
+    filaments, system, positions, _, _ = crowded
+    context = in_context(filaments, system, positions)
+    context.getIntegrator().step(100)
+    context.setPositions(positions)
+    with pytest.raises(InstabilityError, match="Positions of filaments that grow are those of a length"):
+        context.getIntegrator().step(1)
