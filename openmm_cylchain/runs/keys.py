@@ -49,10 +49,28 @@ class ConfigurationError(InputError):
         super().__init__(message)
         self.path = path
 
-    def with_line(self, lines):
-        """The same with its line in front, if it is known; ``lines`` are those of ``toml_lines.lines_of``."""
+    def with_line(self, lines, file=""):
+        """The same with its file and line in front, as far as they are known.
+
+        ``lines`` are those of ``toml_lines.lines_of``.
+        """
         line = line_of(lines, self.path)
-        return self if line is None else ConfigurationError(f"line {line}: {self}")
+        if line is None and not file:
+            return self
+        return LocatedError(f"{place_in_words(file, line)}: {self}")
+
+
+class LocatedError(ConfigurationError):
+    """A mistake whose message begins with its line, and its file if there is one."""
+
+    def with_line(self, lines, file=""):
+        """The same."""
+        return self
+
+
+def place_in_words(file, line):
+    """A file and a line, either of which may be missing (empty, or None)."""
+    return ", ".join([*([str(file)] if file else []), *([] if line is None else [f"line {line}"])])
 
 
 @dataclass(frozen=True)
