@@ -4,7 +4,7 @@ import contextlib
 import functools
 import re
 
-from ..errors import InputError, InstabilityError
+from ..errors import InputError, InstabilityError, TimeStepError
 from .keys import ConfigurationError, LocatedError, place_in_words
 from .toml_lines import line_of
 
@@ -47,11 +47,16 @@ def located_instability(configuration):
     try:
         yield
     except InstabilityError as error:
-        path = () if error.filament is None else _path_of_filament(error.filament, configuration)
-        line = line_of(configuration.lines, path)
-        if line is None:
+        line = line_of(configuration.lines, _path_of_instability(error, configuration))
+        if line is None and not configuration.path:
             raise
         raise type(error)(f"{place_in_words(configuration.path, line)}: {error}", **error.place) from None
+
+
+def _path_of_instability(error, configuration):
+    if error.filament is not None:
+        return _path_of_filament(error.filament, configuration)
+    return ("simulation", "time_step") if isinstance(error, TimeStepError) else ()
 
 
 def _path_of(message, configuration):

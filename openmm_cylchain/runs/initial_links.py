@@ -39,6 +39,7 @@ def _table(configuration, groups, filaments, seed):
         with configuration.tables["link"][number].naming():
             places, distances = _places(own, filaments, configuration.box, np.random.default_rng([seed, number, 5]))
             rests = distances if own.rest_length is None else np.full(len(distances), own.rest_length)
+            places.check(np.arange(len(places)), None)
             _refuse_torn(own, distances, rests)
         extension = np.inf if own.maximum_extension is None else own.maximum_extension
         parts.append((places, rests, np.full(len(rests), own.stiffness), np.full(len(rests), extension)))

@@ -331,7 +331,7 @@ class Recorder:
             self._timed_steps(1)  # which sets things up
             self._report()
             start, first, work = time.monotonic(), self._step, [(0, time.process_time())]
-            while self._step < max(settings.steps, 2) and time.monotonic() - start < most:
+            while self._step == first or (self._step < max(settings.steps, 2) and time.monotonic() - start < most):
                 chunk = self._timed_steps(self._limited(chunk))
                 if moving and self._step % moving.interval == 0:
                     moving.move(self._simulation.context, self._step)
