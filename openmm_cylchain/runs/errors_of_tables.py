@@ -10,6 +10,7 @@ from .toml_lines import line_of
 
 _HEADER = re.compile(r"\[\[(?P<repeated>\w+)\]\] number (?P<number>\d+)|\[(?P<single>\w+)\](?: (?P<key>\w+))?")
 _FILAMENT = re.compile(r"Filament (\d+)\b")
+_TABLES_OF_FORCES = {"CylinderChainContactForce": "contacts", "CylinderChainWallForce": "wall", "Crosslink": "link"}
 _LINKERS = re.compile(r"Linkers '([^']*)'")
 
 
@@ -67,6 +68,9 @@ def _path_of(message, configuration):
         return tuple(one for one in (header["single"], header["key"]) if one)
     if filament:
         return _path_of_filament(int(filament[1]), configuration)
+    of_force = next((table for name, table in _TABLES_OF_FORCES.items() if message.startswith(name)), None)
+    if of_force and len(configuration.tables[of_force]) == 1:
+        return (of_force,)
     if linkers:
         named = [number for number, own in enumerate(configuration.linkers) if own.kind.name == linkers[1]]
         # Where several tables have one name, a wrong line is worse than none.

@@ -262,13 +262,11 @@ def _inside(group, temperature, seed, number, places, planar):
 
 
 def _attempts(group):
-    # One for a straight filament that fits nowhere.
-    if (
-        group.inside is not None
-        and group.start == "straight"
-        and group.segments * group.type.segment_length > group.inside.diameter
-    ):
-        return 1
+    # One for a filament that fits nowhere: if it is straight, or even one of its segments is too long.
+    if group.inside is not None and group.type.segment_kind.straight:
+        shortest = group.segments if group.start == "straight" else 0.5
+        if shortest * group.type.segment_length > group.inside.diameter:
+            return 1
     return max(20, min(_ATTEMPTS, _NODES_OF_ATTEMPTS // group.nodes))
 
 

@@ -312,6 +312,7 @@ def test_trajectories_of_one_run_are_the_same_whenever_they_were_written(tmp_pat
 
 FENE = '[[link]]\nbetween = [{ filament = 0, node = 0 }, { filament = 1, node = 0 }]\nstiffness = "1 pN/nm"\n'
 FENE += 'rest_length = "1 nm"\nmodel = "fene"\nmaximum_extension = "2 nm"\n'
+ITSELF = '[[link]]\nbetween = [{ filament = 0, node = 0 }, { filament = 0, node = 0 }]\nstiffness = "1 pN/nm"\n'
 RANDOM = '[[link]]\nwithin = "{}"\nstiffness = "1 pN/nm"\n'
 WALL = '[[wall]]\nshape = "sphere"\nradius = "70 nm"\nstiffness = "1 pN/nm"\n'
 NARROW = '{ shape = "sphere", radius = "90 nm" }'
@@ -323,6 +324,7 @@ SITES = 'binding_rate = "1 1/s", unbinding_rate = "1 1/s", site_spacing = "300 n
     [
         (BOX, linkers(SITES, "count = 9\nbound = 9"), "[[linkers]]", "Linkers 'm': 9 are to begin bound"),
         (BOX, FENE, "[[link]]", "[[link]] number 1: begins with a length of"),
+        ("", ITSELF, "[[link]]", "[[link]] number 1: Crosslink 0 joins particle 0 to itself."),
         (BOX, RANDOM.format("400 nm"), "within", "[[link]] number 1: within must be less than half"),
         ("", RANDOM.format("90 nm") + 'spacing = "0.01 pm"\n', "spacing", "[[link]] number 1: spacing makes 8e+07"),
         ("", RANDOM.format("9 um") + 'spacing = "0.1 nm"\n', "[[link]]", "[[link]] number 1: within is 9000 nm, where"),
