@@ -12,6 +12,8 @@ from ..filaments.attachments import attachment_positions, lengths_along, places_
 
 _MOST_PLACES, _MOST_PAIRS = 10**7, 3 * 10**7
 """On filaments, and of places that are near enough, to draw random links from."""
+_MOST_LINKS = 10**6
+"""Where there is no count: more are likely meant to be fewer."""
 
 
 def add_links(configuration, filaments, system, seed):
@@ -107,6 +109,10 @@ def _random_places(own, filaments, box, generator):
     ends = np.stack([np.concatenate(firsts), np.concatenate(seconds)], axis=1)
     fractions, points, owners = map(np.concatenate, (fractions, points, owners))
     found = _pairs_within(own.within, points, owners, box)
+    if own.count is None and len(found) > _MOST_LINKS:
+        raise InputError(
+            f"within is {own.within:g} nm, which makes {len(found):.2g} links: give a count of those that are meant."
+        )
     if own.count is not None and len(found) > own.count:
         found = found[np.sort(generator.choice(len(found), own.count, replace=False))]
     distances = np.linalg.norm(_nearest(points[found[:, 1]] - points[found[:, 0]], box), axis=1)

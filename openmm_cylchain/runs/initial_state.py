@@ -18,6 +18,7 @@ from ..couplings.walls import filament_wall_force, wall_force
 from ..errors import InputError
 from ..filaments import shapes
 from ..filaments.segment_place import SegmentPlace
+from ..output.progress import LateMessages, ProgressMessages
 from ..systems.filaments import Filaments
 from ..theory import chain_mean_square_end_to_end
 from ..time_steps.recommended_step import recommended_time_step
@@ -146,8 +147,13 @@ def place_filaments(configuration, engine, seed, linkers=True):
     filaments = Filaments(solvent.viscosity, solvent.temperature, engine)
     centers = _grid_centers(configuration.filaments, solvent.temperature) if box is None else None
     planar = None if configuration.contacts is None else PlanarSegments(box_vectors(box))
+    messages = ProgressMessages()
+    progress = LateMessages(
+        messages, "filaments are placed: {} of {}", sum(own.count for own in configuration.filaments)
+    )
     for group in configuration.filaments:
         for index in range(group.count):
+            progress.one_is_done()
             number = len(filaments)
             places = np.random.default_rng([seed, number, 1])
             own = group, index, solvent.temperature, seed, number, places, box, centers
@@ -155,6 +161,7 @@ def place_filaments(configuration, engine, seed, linkers=True):
             if planar is not None and group.planar:
                 planar.add(number, nodes, group.closed)
             _add(filaments, group, nodes, control_points)
+    messages.finish()
     if configuration.contacts is not None:
         for number, filament in enumerate(filaments):
             if not filament.type.segment_kind.straight:
