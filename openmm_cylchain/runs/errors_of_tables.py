@@ -68,6 +68,8 @@ def _path_of(message, configuration):
         return tuple(one for one in (header["single"], header["key"]) if one)
     if filament:
         return _path_of_filament(int(filament[1]), configuration)
+    if message.startswith("Scheme "):
+        return "simulation", "scheme"
     of_force = next((table for name, table in _TABLES_OF_FORCES.items() if message.startswith(name)), None)
     if of_force and len(configuration.tables[of_force]) == 1:
         return (of_force,)
