@@ -62,19 +62,21 @@ class ProgressMessages:
 class LateMessages:
     """Says how many parts of a task are done, if it is not soon done: more and more rarely, since some take minutes.
 
-    ``text`` has two braces, for the number of parts that are done and of all.
+    ``text`` has two braces, for the number of parts that are done and of all; ``clock`` tells seconds.
     """
 
-    def __init__(self, say: Callable[[str], None], text: str, parts: int) -> None:
-        self._say, self._text, self._parts = say, text, parts
+    def __init__(
+        self, say: Callable[[str], None], text: str, parts: int, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._say, self._text, self._parts, self._clock = say, text, parts, clock
         self._done = 0
-        self._start = time.monotonic()
+        self._start = clock()
         self._next = self._start + _SECONDS_BETWEEN_LATE_MESSAGES
 
     def one_is_done(self) -> None:
         """Count one more part."""
         self._done += 1
-        now = time.monotonic()
+        now = self._clock()
         if now >= self._next:
             self._next = now + max(_SECONDS_BETWEEN_LATE_MESSAGES, 0.5 * (now - self._start))
             self._say(self._text.format(self._done, self._parts))
