@@ -7,7 +7,7 @@ import pytest
 
 import openmm_cylchain
 
-LATE = ("analysis", "scans", "theory")
+LATE = ("analysis", "rendering", "scans", "theory")
 SLOW = (
     "matplotlib",
     "mdtraj",

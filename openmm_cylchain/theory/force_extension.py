@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import replace
 
@@ -100,13 +101,23 @@ def _bending_transfer(filament_type, temperature, force):
     node, weight = _cosine_nodes(2 * order, force * filament_type.segment_length)
     if filament_type.joint_stiffness == 0.0:
         return node, weight, np.full((len(node), len(node)), 0.5)
-    coefficients = [
-        cosines.mean(lambda cosine, n=n: np.polynomial.legendre.legval(cosine, np.eye(1, n + 1, n)[0]))  # type: ignore[misc]
-        for n in range(order)
-    ]
+    coefficients = _legendre_means(cosines, order)
     polynomials = np.polynomial.legendre.legvander(node, order - 1)
     scale = (np.arange(order) + 0.5) * np.array(coefficients)
     return node, weight, (polynomials * scale) @ polynomials.T
+
+
+def _legendre_means(cosines, order):
+    # Means of the first polynomials. Each is made of the two before it: there are thousands for stiff joints.
+    last, before = 1.0, 0.0
+
+    def polynomial(number, cosine):
+        nonlocal last, before
+        if number > 0:
+            last, before = ((2 * number - 1) * cosine * last - (number - 1) * before) / number, last
+        return last
+
+    return [cosines.mean(functools.partial(polynomial, number)) for number in range(order)]
 
 
 def _cosine_nodes(least, alignment):

@@ -518,7 +518,7 @@ def test_blow_up_is_reported_and_leaves_no_broken_frame(tmp_path, capsys):
     assert main(["run", config, "--output", str(output)]) == 1
     errors = capsys.readouterr().err
     assert "warning: A time step of 400 ns exceeds the stretching bound" in errors
-    assert re.search(r"error: Filament \d \(ACT\) has blown up at segment \d in step \d+", errors)
+    assert re.search(r"error: \S+, line \d+: Filament \d \(ACT\) has blown up at segment \d in step \d+", errors)
     assert "another directory" in errors and "Traceback" not in errors
     trajectory = mdtraj.load_dcd(str(output / "trajectory.dcd"), top=str(output / "topology.cif"))
     assert 1 <= trajectory.n_frames < 200
@@ -542,7 +542,9 @@ def test_infinite_energy_is_not_written(tmp_path, capsys):
     )
     output = tmp_path / "out"
     assert main(["run", config, "--output", str(output)]) == 1
-    assert re.search(r"error: Filament \d \(ACT\) has blown up at segment \d in step \d+", capsys.readouterr().err)
+    assert re.search(
+        r"error: \S+, line \d+: Filament \d \(ACT\) has blown up at segment \d in step \d+", capsys.readouterr().err
+    )
     energies = read_table(output / "energies.csv")
     assert all(np.all(np.isfinite(column)) for column in energies.values())
 
