@@ -71,9 +71,7 @@ def relaxation_modulus(
         Without a periodic box and a volume, for frames that are not at equal distances, or too few for the lag.
     """
     room = volume_of(run, volume)
-    chosen = np.arange(len(run))
-    chosen = chosen[frames] if frames is None or isinstance(frames, slice) else chosen[np.atleast_1d(frames)]
-    chosen = chosen.reshape(-1)
+    chosen = run.chosen_frames(frames)
     maximum_lag = whole_number(maximum_lag, 0, "maximum_lag")
     if len(chosen) < _FEWEST_BLOCKS * max(1, maximum_lag):
         raise InputError(
