@@ -308,6 +308,7 @@ class BeadSpringType(ChainType):
 
     def node_masses(self, nodes: int, closed: bool = False) -> FloatArray:
         """Masses (nodes,) in Da: ``bead_mass``."""
+        true_or_false(closed, "closed")
         return np.full(number_of(nodes, "nodes", 2), self.bead_mass)
 
     def segment_friction(self, viscosity: Scalar, temperature: Scalar, segments: int = 1) -> SegmentFriction:

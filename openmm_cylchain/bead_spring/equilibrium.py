@@ -157,5 +157,6 @@ def bead_spring_persistence_length(bead_type: BeadSpringType, temperature: Scala
     From the largest eigenvalues of the transfer operator. It is shorter than l_p = kappa a^3/(k_B T), eq. (3), by the
     order of a: 112.7 a of ``DSDNA_BASE_PAIRS``, where l_p is 114.4 a.
     """
-    length = bead_type.bead_spacing * _operator(bead_type, 1, temperature, planar).correlation_length()
+    operator = _operator(bead_type, 1, temperature, planar)
+    length = bead_type.bead_spacing * operator.correlation_length()
     return 0.5 * length if planar else length

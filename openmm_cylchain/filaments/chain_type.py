@@ -123,10 +123,12 @@ class ChainType(ABC):
 
     def segment_lengths(self, segments: int, closed: bool = False) -> FloatArray:
         """Rest lengths (segments,) in nm."""
+        true_or_false(closed, "closed")
         return np.full(number_of(segments, "segments"), self.segment_length)
 
     def segment_stiffnesses(self, segments: int, closed: bool = False) -> FloatArray:
         """Stretching stiffnesses (segments,) in kJ/(mol nm^2)."""
+        true_or_false(closed, "closed")
         return np.full(number_of(segments, "segments"), self.segment_stiffness)
 
     def straight_lengths(self, segments: int) -> FloatArray:
@@ -172,6 +174,7 @@ class ChainType(ABC):
 
     def check_folds(self, vectors: Vectors, label: str, closed: bool = False) -> None:
         """Raise InputError if a bending force is not defined between segments with vectors (segments, 3) in nm."""
+        require_kind(label, str, "label")
         self._check_folds(_vectors(vectors, 2), label, true_or_false(closed, "closed"))
 
     @abstractmethod

@@ -185,8 +185,13 @@ class FilamentType(ChainType):
                 value = positive(value, dimension, f"{attribute} of filament type {self.name!r}")
                 self._check_magnitude(attribute, value)
                 self._set(attribute, value)
-        if self.mass_per_length is None:
-            self._fail("mass_per_length must be given; 3500 Da/nm if it is left out.")
+        for attribute, usual in (
+            ("diameter", ""),
+            ("segment_length", ""),
+            ("mass_per_length", "; usual are 3500 Da/nm"),
+        ):
+            if getattr(self, attribute) is None:
+                self._fail(f"{attribute} must be given{usual}.")
         self._resolve_bending()
         if (self.stretching_stiffness is None) == (self.stretching_modulus is None):
             self._fail("give either stretching_stiffness (of one segment) or stretching_modulus (EA).")
@@ -436,6 +441,7 @@ class FilamentType(ChainType):
         SegmentFriction
         """
         segments = whole_number(segments, 1, "segments")
+        thermal_energy(temperature)
         length, logarithm_length = self.segment_length, self._logarithm_length(segments)
         parallel, perpendicular, rotational = self.segment_kind.frictions(
             length, self.diameter, viscosity, self.end_corrections, logarithm_length

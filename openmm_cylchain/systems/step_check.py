@@ -43,8 +43,10 @@ import openmm
 from ..engine_choice import default_scheme
 from ..errors import InputError, InstabilityError
 from ..filaments.collection import require_filaments
+from ..filaments.placement import refuse_coinciding
 from ..kinetics.binding_force import find_binding_force
 from ..mechanics.flow import Flow
+from ..mechanics.geometry import segment_vectors
 from ..time_steps.recommended_step import recommended_time_step
 from ..time_steps.schemes import check_scheme
 from ..time_steps.time_step import TimeStep, as_step
@@ -160,6 +162,9 @@ def check_time_step(
             f"positions must have the shape ({system.getNumParticles()}, 3) of the System's particles, but have "
             f"{positions.shape}."
         )
+    for number, (filament, nodes) in enumerate(zip(filaments, filaments.node_indices)):
+        apart = np.linalg.norm(segment_vectors(positions[nodes], filament.closed), axis=1)
+        refuse_coinciding(apart, len(nodes), f"positions: filament {number}")
     equilibrium = true_or_false(equilibrium, "equilibrium")
     require_callable(say, "say")
     require_callable(stop, "stop")

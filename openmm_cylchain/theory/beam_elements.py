@@ -9,11 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from ..beams.equilibrium import ElementAverages, element_averages
+from ..errors import InputError
 from ..filaments.chain_type import ChainType
 from ..filaments.filament_type import FilamentType
 from ..units.quantities import require_kind
 from ..units.types import FloatOrArray, Scalar
 from .arguments import each_whole_number, number_in_memory, thermal_energy_above_zero
+
+_LONGEST = 10.0
 
 
 def beam_averages(filament_type: FilamentType, temperature: Scalar, planar: bool = False) -> ElementAverages:
@@ -21,7 +24,13 @@ def beam_averages(filament_type: FilamentType, temperature: Scalar, planar: bool
     require_kind(filament_type, ChainType, "filament_type")
     kT = thermal_energy_above_zero(temperature)
     element = filament_type.beam_element(temperature, planar)
-    return element_averages(element.length * kT / element.rigidity, bool(planar))
+    bend = element.length * kT / element.rigidity
+    if bend > _LONGEST:
+        raise InputError(
+            f"Filament type {filament_type.name!r}: an element is {bend:.3g} persistence lengths long at this "
+            f"temperature, and averages are those of up to {_LONGEST:g}: take a shorter segment_length."
+        )
+    return element_averages(bend, bool(planar))
 
 
 def beam_tangent_correlation(

@@ -13,6 +13,7 @@ from ..units.quantities import (
     DIMENSIONLESS,
     ENERGY,
     LENGTH,
+    VISCOSITY,
     finite_number,
     positive,
     require_kind,
@@ -112,6 +113,8 @@ def recommended_time_step(
     propulsion = finite_number(propulsion, ENERGY / LENGTH, "propulsion")
     if friction is not None:
         require_kind(friction, SegmentFriction, "friction")
+    positive(viscosity, VISCOSITY, "viscosity")
+    thermal_energy(temperature)
     if isinstance(filament_type, BeadSpringType):
         return bead_spring_time_step(filament_type, scheme, segments, closed, flow)
     if scheme == MODES:

@@ -188,9 +188,9 @@ def stability_bounds(
     Of beads one alone, ``springs``, see ``bead_spring_step.bead_spring_stability_bound``.
     """
     require_kind(filament_type, ChainType, "filament_type")
+    friction = filament_type.segment_friction(viscosity, temperature, segments)
     if isinstance(filament_type, BeadSpringType):
         return {"springs": bead_spring_stability_bound(filament_type)}
-    friction = filament_type.segment_friction(viscosity, temperature, segments)
     return bounds_of_chain(filament_type, friction, segments)
 
 

@@ -310,7 +310,7 @@ def test_refused_with_the_name_of_the_type(changes, message):
 
 
 def test_end_correction_that_is_not_finite():
-    with pytest.raises(InputError, match="rotational end correction must be finite"):
+    with pytest.raises(InputError, match="EndCorrections: rotational must be finite"):
         variant(end_corrections=EndCorrections(rotational=math.nan))
 
 
