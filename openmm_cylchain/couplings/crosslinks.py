@@ -342,8 +342,9 @@ class Crosslinks:
         InputError
             For particles that do not exist, or a crosslink of a place to itself.
         """
-        store, places = self._store_for(context), as_places(pairs)
-        places.check(np.arange(len(places)), None if store is None else context.getSystem().getNumParticles())
+        self._store_for(context)
+        places = as_places(pairs)
+        places.check(np.arange(len(places)), None if context is None else context.getSystem().getNumParticles())
         self._replace(context, CrosslinkTable().with_links(places, *self._defaults))
 
     def table(self, context: openmm.Context | None) -> CrosslinkTable:
@@ -362,10 +363,10 @@ class Crosslinks:
         """Give a Context the crosslinks of a table, with the numbers and parameters that it holds."""
         if not isinstance(table, CrosslinkTable):
             raise InputError(f"table must be a CrosslinkTable, as Crosslinks.table returns it, but is {shown(table)}.")
-        store = self._store_for(context)
+        self._store_for(context)
         if len(table) and np.all(np.isfinite(table.maximum_extension)) != (self._model == "fene"):
             raise InputError(f"The table is not one of crosslinks with model {self._model!r}.")
-        table.places.check(table.numbers, None if store is None else context.getSystem().getNumParticles())
+        table.places.check(table.numbers, None if context is None else context.getSystem().getNumParticles())
         self._replace(context, table)
 
     def lengths(self, context: openmm.Context) -> FloatArray:
@@ -452,7 +453,8 @@ class Crosslinks:
     def _store_in(self, context):
         if self._store is None:
             raise InputError("These crosslinks are not in a System yet: call add_to before Contexts are created.")
-        require_kind(context, openmm.Context, "context")
+        if not isinstance(context, openmm.Context):
+            raise InputError(f"context must be an openmm.Context, but is {shown(context)}.")
         self._store.require(context)
         return self._store
 

@@ -198,7 +198,8 @@ class FilamentType(ChainType):
         if self.extension_relaxation_time is not None and self.extensional_friction is not None:
             self._fail("give either extension_relaxation_time or extensional_friction, not both.")
         self._check_choices()
-        self._check_end_corrections()
+        if not isinstance(self.end_corrections, EndCorrections):
+            self._fail("end_corrections must be an EndCorrections(parallel, perpendicular, rotational).")
         self._check_segment_length()
 
     def _set(self, attribute, value):
@@ -254,16 +255,12 @@ class FilamentType(ChainType):
             )
 
     def _check_friction_length(self):
+        if isinstance(self.friction_length, str) and self.friction_length in ("segment", "filament"):
+            return
         if isinstance(self.friction_length, str):
-            if self.friction_length in ("segment", "filament"):
-                return
             self._fail(f"friction_length must be one of segment, filament, or a length, but is {self.friction_length}.")
         length = positive(self.friction_length, LENGTH, f"friction_length of filament type {self.name!r}")
         self._set("friction_length", length)
-
-    def _check_end_corrections(self):
-        if not isinstance(self.end_corrections, EndCorrections):
-            self._fail("end_corrections must be an EndCorrections(parallel, perpendicular, rotational).")
 
     def _check_segment_length(self):
         if self.friction_length != "filament":

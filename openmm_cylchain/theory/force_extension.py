@@ -115,7 +115,7 @@ def _legendre_means(cosines, order):
     last, polynomial = np.zeros_like(cosine), np.ones_like(cosine)
     means = np.empty(order)
     for n in range(order):
-        means[n] = cosines.mean(lambda _, values=polynomial: values)  # type: ignore[misc]
+        means[n] = cosines.mean(lambda _, values=polynomial: values)
         last, polynomial = polynomial, ((2 * n + 1) * cosine * polynomial - n * last) / (n + 1)
     return means
 
