@@ -22,7 +22,7 @@ from ..output.record_file import read_records
 from ..output.run_description import DescribedLinkers, RunDescription
 from ..output.run_files import RunFiles
 from ..output.run_tables import MILLISECOND
-from ..units.quantities import VOLUME, numbers_of, positive, require_kind, shown, thermal_energy, whole_number
+from ..units.quantities import VOLUME, numbers_of, positive, shown, thermal_energy, whole_number
 from ..units.types import FloatArray, Indices, IntArray, Scalar
 from .run_filaments import PIECES_OF_ELEMENT, RunParticles, chain_of, described_filament
 from .run_topology import read_topology
@@ -258,7 +258,7 @@ class Run:
         frames : slice or list of int, optional
             All if not given.
         """
-        chosen = self.chosen_frames(frames)
+        chosen = self._chosen(frames)
         topology = read_topology(self._files.topology, self._description.particles)
         xyz = np.array([self.positions(frame) for frame in chosen], dtype=np.float32)
         trajectory = mdtraj.Trajectory(xyz, topology, time=self.times[chosen])
@@ -266,8 +266,7 @@ class Run:
             trajectory.unitcell_vectors = np.repeat(self.box[None], len(chosen), axis=0)
         return trajectory
 
-    def chosen_frames(self, frames: slice | Indices | None) -> IntArray:
-        """Numbers of frames that are meant, all if None; InputError for those that are none."""
+    def _chosen(self, frames):
         if frames is None:
             return np.arange(len(self))
         if isinstance(frames, slice):
@@ -388,9 +387,15 @@ class Run:
         return [total / len(frames) for total in totals]
 
 
+def require_run(run: Run) -> None:
+    """Raise InputError for what has no filaments in frames."""
+    if not (hasattr(run, "filaments") and hasattr(run, "box")):
+        raise InputError(f"run must be a Run, as analysis.load returns it, but is {shown(run)}.")
+
+
 def volume_of(run: Run, volume: Scalar | None) -> float:
     """A volume in nm^3; that of the periodic box of a run if None, InputError if it has none."""
-    require_kind(run, Run, "run")
+    require_run(run)
     if volume is not None:
         return positive(volume, VOLUME, "volume")
     if run.box is None:

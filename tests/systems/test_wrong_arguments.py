@@ -340,7 +340,7 @@ def _built():
         (lambda f, s: theory.marko_siggia_extension(1e300, 50.0, 300.0), "force must be between"),
         (lambda f, s: theory.mean_orientation(1.0, None, 300.0), "friction must be an object"),
         (lambda f, s: theory.bead_spring_mode_variances(DSDNA_BASE_PAIRS, 4, "a", 300.0), "modes must be a sequence"),
-        (lambda f, s: analysis.stress(None, 0), "run must be an object of the class Run"),
+        (lambda f, s: analysis.stress(None, 0), "run must be a Run, as analysis.load returns it"),
         (lambda f, s: analysis.load(None), "path must be a path, but is None"),
         (lambda f, s: analysis.order_parameter("a"), "vectors must be a number or an array"),
         (lambda f, s: analysis.find_crossings(3, np.eye(3), np.eye(3)), "chains must be int arrays"),
