@@ -19,7 +19,7 @@ import scipy
 from ..errors import InputError
 from ..filaments.beam_refusals import refuse_beams
 from ..filaments.collection import FilamentCollection
-from ..units.quantities import LENGTH, in_units_of, positive
+from ..units.quantities import LENGTH, in_units_of, positive, shown
 from ..units.types import BoolArray, BoxVectors, FloatArray, IntArray, Scalar, Vectors
 
 # Of the width of a bracket around the time of a crossing: 2^-52.
@@ -165,9 +165,14 @@ class _Segments:
     # The segments of all chains, one after another.
 
     def __init__(self, chains):
-        chains = [np.asarray(chain) for chain in (_chains_of(chains) if hasattr(chains, "node_indices") else chains)]
+        wrong = "chains must be int arrays, one for each chain, with the indices of two nodes or more."
+        try:
+            own = _chains_of(chains) if hasattr(type(chains), "node_indices") else chains
+            chains = [np.asarray(chain) for chain in own]
+        except (TypeError, ValueError):
+            raise InputError(wrong) from None
         if not chains or any(c.ndim != 1 or len(c) < 2 or c.dtype.kind not in "iu" for c in chains):
-            raise InputError("chains must be int arrays, one for each chain, with the indices of two nodes or more.")
+            raise InputError(wrong)
         self._minus = np.concatenate([chain[:-1] for chain in chains])
         self._plus = np.concatenate([chain[1:] for chain in chains])
         self._chain = np.repeat(np.arange(len(chains)), [len(chain) - 1 for chain in chains])
@@ -251,9 +256,13 @@ def _chains_of(filaments):
 def _box(box_vectors):
     if box_vectors is None:
         return None
-    box = np.array([in_units_of(edge, LENGTH, "box_vectors") for edge in box_vectors])
+    try:
+        edges = list(box_vectors)
+    except TypeError:
+        edges = []
+    box = np.asarray(in_units_of(edges, LENGTH, "box_vectors"))
     if box.shape != (3, 3):
-        raise InputError(f"box_vectors must be three vectors, but have the shape {box.shape}.")
+        raise InputError(f"box_vectors must be three vectors, but are {shown(box_vectors)}.")
     if not abs(np.linalg.det(box)) > 0.0:
         raise InputError("box_vectors must span a volume.")
     return box

@@ -60,7 +60,7 @@ def control_points_of(nodes: FloatArray, tangents: FloatArray, length: float) ->
 def natural_tangents(nodes: FloatArray, closed: bool = False) -> FloatArray:
     """Unit vectors (nodes, 3) along the natural cubic spline through nodes (nodes, 3), which bends least.
 
-    Of a ring, along the periodic one.
+    Of a ring, along the periodic one. NaN where it stops and turns back.
     """
     if closed:
         around = unrolled(nodes)
@@ -71,7 +71,8 @@ def natural_tangents(nodes: FloatArray, closed: bool = False) -> FloatArray:
     else:
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(nodes, axis=0), axis=1))])
         slopes = scipy.interpolate.CubicSpline(along, nodes, bc_type="natural")(along, 1)
-    return slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
+    with np.errstate(invalid="ignore"):
+        return slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
 
 
 def _hermite(places, derivative):

@@ -13,7 +13,15 @@ from ..engine_choice import available_engines, choose_engine
 from ..errors import ContactWarning, InputError
 from ..filaments.chain_type import ChainType
 from ..filaments.collection import FilamentCollection, require_filaments
-from ..units.quantities import LENGTH, STIFFNESS, positive, thermal_energy, true_or_false, whole_number
+from ..units.quantities import (
+    LARGEST_INT,
+    LENGTH,
+    STIFFNESS,
+    positive,
+    thermal_energy,
+    true_or_false,
+    whole_number,
+)
 from ..units.types import Indices, Numbers, Scalar
 from .contacts import SAFE_BARRIER, filament_diameters, outside_particles, particle_diameters
 from .periodicity import default_box, is_periodic
@@ -144,7 +152,7 @@ def capsule_contact_force(
         stiffness = default_capsule_stiffness(diameters.min(), filaments.temperature)
     stiffness = positive(stiffness, STIFFNESS, "stiffness")
     if excluded_neighbors is not None:
-        excluded_neighbors = whole_number(excluded_neighbors, 0, "excluded_neighbors")
+        excluded_neighbors = whole_number(excluded_neighbors, 0, "excluded_neighbors", LARGEST_INT)
     periodic = is_periodic(system) if periodic is None else true_or_false(periodic, "periodic")
     if periodic:
         _check_box(system, filaments, max([*diameters, *sphere_diameters]))

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from ..beams.curve import particle_weights, place_weights
 from ..errors import InputError
-from ..units.quantities import DIMENSIONLESS, LENGTH, in_units_of, non_negative, whole_number
+from ..units.quantities import DIMENSIONLESS, LENGTH, in_units_of, non_negative, require_kind, whole_number
 from ..units.types import FloatArray, Indices, IntArray, Scalar
 from .chain_type import ChainType
 from .filament import Filament
@@ -28,6 +28,8 @@ ATTACHMENT_NAME = "ATT"
 
 BEAD_NAME = "BED"
 """Atom name of beads in topologies."""
+
+_MOST_BEADS = 10**6
 
 SAME_PLACE = 1e-9
 """Places that are closer than this along a contour, in segments, are one."""
@@ -50,6 +52,12 @@ class Attachment:
     segment: int
     fraction: float
     name: str = ATTACHMENT_NAME
+
+    def __post_init__(self) -> None:
+        for name in ("filament", "segment"):
+            object.__setattr__(self, name, whole_number(getattr(self, name), 0, f"Attachment: {name}"))
+        object.__setattr__(self, "fraction", _fraction(self.fraction, "Attachment"))
+        require_kind(self.name, str, "Attachment: name")
 
 
 def locate(
@@ -125,7 +133,8 @@ def _segment(segment, filament, label):
 
 
 def _fraction(fraction, label):
-    fraction = 0.5 if fraction is None else in_units_of(fraction, DIMENSIONLESS, f"{label}: fraction")
+    if not isinstance(fraction, float) or not 0.0 <= fraction <= 1.0:
+        fraction = 0.5 if fraction is None else in_units_of(fraction, DIMENSIONLESS, f"{label}: fraction")
     if not isinstance(fraction, float) or not 0.0 <= fraction <= 1.0:
         raise InputError(f"{label}: fraction must be a number between 0 and 1, but is {fraction}.")
     return fraction
@@ -193,6 +202,11 @@ def distribute_beads(filament: Filament, number: int, spacing: float) -> list[At
     """
     kind = filament.type.segment_kind
     intervals = kind.intervals(filament.segments, filament.type.segment_length, spacing)
+    if intervals > _MOST_BEADS:
+        raise InputError(
+            f"Beads of filament {number}: spacing is {spacing:g} nm, which makes {intervals:.3g} beads, and at most "
+            f"{_MOST_BEADS:.0e} are possible: take half of the contact diameter."
+        )
     # In a ring, the last place would be the first once more.
     count = intervals if filament.closed else intervals + 1
     places = filament.segments * np.arange(count) / intervals

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from ..units.quantities import TEMPERATURE, positive, thermal_energy
+from ..units.quantities import TEMPERATURE, positive, thermal_energy, true_or_false
 from ..units.types import FloatArray, FloatOrArray, Scalar
 
 _GRID = 20001
@@ -60,6 +60,11 @@ class _Marginal:
         self._weight = weight
         self._cumulative = cumulative / cumulative[-1]
 
+    @property
+    def coordinate(self) -> FloatArray:
+        """The grid."""
+        return self._coordinate
+
     def mean(self, function: Callable[[FloatArray], npt.ArrayLike]) -> float:
         """Average of ``function`` (of the coordinate) by Simpson's rule."""
         values = np.where(self._weight > 0, function(self._coordinate), 0.0)
@@ -88,6 +93,7 @@ class SegmentLengthDistribution(_Marginal):
     """
 
     def __init__(self, filament_type: IndependentJoints, temperature: Scalar, planar: bool = False) -> None:
+        planar = true_or_false(planar, "planar")
         kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
         rest, stiffness = filament_type.segment_length, filament_type.segment_stiffness
         if filament_type.maximum_extension is not None:

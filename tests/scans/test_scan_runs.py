@@ -132,7 +132,7 @@ def test_dry_run_and_wrong_options(tmp_path, capsys):
     for options, message in (
         ([], "--output DIR"),
         (["--output", path], "is a file"),
-        (["--output", str(tmp_path), "--workers", "0"], "workers must be a whole number"),
+        (["--output", str(tmp_path), "--workers", "0"], "workers must be at least 1"),
         (["--output", str(tmp_path), "--executor", "dask"], "--scheduler ADDRESS"),
         (["--output", str(tmp_path), "--workers", "2", "--executor", "mpi"], "has workers of its own"),
     ):
