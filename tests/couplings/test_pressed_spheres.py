@@ -80,7 +80,7 @@ def test_a_pressed_sphere_lies_where_quadrature_says(step, sphere):
     """Within 2 % of its overlap, and with its fluctuations within 10 %."""
     exact, variance = _distances(sphere)
     overlap = 0.5 * (DIAMETER + sphere) - exact
-    found = _run(sphere, step, 14000)
+    found = _run(sphere, step, 20000)
     mean, error = _mean_and_error(found)
     assert 4 * error < 0.05 * overlap
     assert mean == pytest.approx(exact, abs=0.02 * overlap + 4 * error)
