@@ -34,6 +34,12 @@ def test_what_is_slow_is_not_loaded():
     assert not {*SLOW} & {*loaded}
 
 
+def test_the_command_starts_without_what_is_slow():
+    loaded = in_a_fresh_interpreter("import openmm_cylchain.cli, sys; print(*sys.modules)")
+    assert "openmm_cylchain.scans.command" in loaded
+    assert not {name for name in SLOW if not name.startswith("openmm_cylchain.")} & {*loaded}
+
+
 @pytest.mark.parametrize("name", LATE)
 def test_modules_for_users_are_loaded_when_they_are_asked_for(name):
     code = f"import openmm_cylchain; print(openmm_cylchain.{name}.__name__)"

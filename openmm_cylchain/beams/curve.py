@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from ..mechanics.geometry import unrolled
+from ..mechanics.geometry import cross, unrolled
 from ..mechanics.quadrature import gauss_points
 from ..units.types import FloatArray
 
@@ -138,7 +138,7 @@ def arc_lengths(nodes: FloatArray, control_points: FloatArray, closed: bool = Fa
 
 def _bend(first, second):
     # The rotation from one direction to another, as vectors along its axis.
-    axis = np.cross(first, second)
+    axis = cross(first, second)
     sine, cosine = np.linalg.norm(axis, axis=-1), np.sum(first * second, axis=-1)
     factor = np.where(sine > 0.0, np.arctan2(sine, cosine) / np.where(sine > 0.0, sine, 1.0), 1.0)
     return axis * factor[..., None]

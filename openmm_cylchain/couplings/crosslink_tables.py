@@ -96,10 +96,11 @@ class CrosslinkTable:
             self._set(name, getattr(places, name))
         # They share their arrays.
         object.__setattr__(self, "_places", places)
-        active = np.array(self.active, dtype=None if isinstance(self.active, np.ndarray) else object)
-        known = active.dtype == bool or all(isinstance(one, (bool, np.bool_)) for one in active.ravel())
-        if not active.ndim or not known:
-            raise InputError("active of a table of crosslinks must be an array of True and False.")
+        active = self.active
+        if not (isinstance(active, np.ndarray) and active.dtype == bool and active.ndim):
+            active = np.array(active, dtype=object)
+            if not active.ndim or not all(isinstance(one, (bool, np.bool_)) for one in active.ravel()):
+                raise InputError("active of a table of crosslinks must be an array of True and False.")
         active = active.astype(bool)
         self._set("active", active if len(active) else np.ones(len(self.numbers), dtype=bool))
         self._check()

@@ -11,6 +11,7 @@ import scipy
 from ..errors import InputError
 from ..filaments.equilibrium import JointAngleDistribution
 from ..filaments.filament_type import FilamentType
+from ..mechanics.quadrature import gauss_points
 from ..units.quantities import DIMENSIONLESS, FORCE, LENGTH, PICONEWTON, STIFFNESS, in_units_of, positive, whole_number
 from ..units.types import FloatOrArray, Numbers, Scalar
 from .arguments import each_not_negative, number_in_memory, require_straight_segments, thermal_energy_above_zero
@@ -105,19 +106,8 @@ def _bending_transfer(filament_type, temperature, force):
     if filament_type.joint_stiffness == 0.0:
         return node, weight, np.full((len(node), len(node)), 0.5)
     polynomials = np.polynomial.legendre.legvander(node, order - 1)
-    scale = (np.arange(order) + 0.5) * _legendre_means(cosines, order)
+    scale = (np.arange(order) + 0.5) * cosines.legendre_means(order)
     return node, weight, (polynomials * scale) @ polynomials.T
-
-
-def _legendre_means(cosines, order):
-    # Means of Legendre polynomials, by their recurrence: (n + 1) P_(n+1) = (2 n + 1) c P_n - n P_(n-1).
-    cosine = cosines.coordinate
-    last, polynomial = np.zeros_like(cosine), np.ones_like(cosine)
-    means = np.empty(order)
-    for n in range(order):
-        means[n] = cosines.mean(lambda _, values=polynomial: values)
-        last, polynomial = polynomial, ((2 * n + 1) * cosine * polynomial - n * last) / (n + 1)
-    return means
 
 
 def _cosine_nodes(least, alignment):
@@ -129,9 +119,8 @@ def _cosine_nodes(least, alignment):
             "Segments are too stiff or too strongly aligned for this sum over their directions: take a smaller force, "
             "a higher temperature or longer segments."
         )
-    gauss, gauss_weight = np.polynomial.legendre.leggauss(points)
-    root = 0.5 * (gauss + 1.0)
-    return 1.0 - 2.0 * root**2, 2.0 * root * gauss_weight
+    root, weight = gauss_points(points)
+    return 1.0 - 2.0 * root**2, 4.0 * root * weight
 
 
 def _pulled_lengths(filament_type, force, kT, node):
@@ -141,9 +130,9 @@ def _pulled_lengths(filament_type, force, kT, node):
     low, high = rest - 12.0 * width, rest + 12.0 * width + force * width**2 + 2.0 * width**2 / rest
     if filament_type.maximum_extension is not None:
         low, high = (rest + sign * filament_type.maximum_extension * (1.0 - 1e-12) for sign in (-1.0, 1.0))
-    gauss, gauss_weight = np.polynomial.legendre.leggauss(200)
+    place, gauss_weight = gauss_points(200)
     low = max(low, 0.0)
-    length = low + 0.5 * (high - low) * (gauss + 1.0)
+    length = low + (high - low) * place
     with np.errstate(divide="ignore"):
         exponent = 2.0 * np.log(length) - filament_type.stretching_energy(length) / kT + np.outer(node, force * length)
     density = gauss_weight * np.exp(exponent - exponent.max())

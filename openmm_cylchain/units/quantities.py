@@ -57,6 +57,9 @@ def in_units_of(value: Numbers, target: unit.Unit, name: str) -> FloatOrArray:
     (pN/nm, Pa s) is turned into one per mole (kJ/mol/nm^2) where ``target`` is molar. InputError if the value is not a
     number, not finite, beyond what can be computed with, or has the dimension of something else.
     """
+    # By far the most frequent, and this is asked of every filament that is added.
+    if isinstance(value, float) and math.isfinite(value):
+        return float(value)
     if not isinstance(value, unit.Quantity) and isinstance(value, (list, tuple)):
         if any(isinstance(item, unit.Quantity) for item in value):
             value = np.array([in_units_of(item, target, name) for item in value])

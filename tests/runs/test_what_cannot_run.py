@@ -15,6 +15,7 @@ from openmm_cylchain.runs.run import begin, check_step, create_simulation
 from openmm_cylchain.runs.run_directory import RunDirectory
 from openmm_cylchain.runs.summarised_run import run_with_summary
 from openmm_cylchain.runs.tables.shapes import REGION, Region
+from support.run_figures import rendered
 
 SOLVENT = '[solvent]\ntemperature = "300 K"\nviscosity = "1 mPa*s"\n'
 BOX = '[box]\nedges = ["600 nm", "600 nm", "600 nm"]\n'
@@ -46,7 +47,8 @@ def linkers(rates, more, name="m", reach=50):
 
 
 def test_a_run_of_joints_too_stiff_for_a_grid_of_angles_has_its_figure(tmp_path):
-    groups, _, _ = run_with_summary(parsed(filament=STIFF), tmp_path / "out")
+    with rendered():
+        groups, _, _ = run_with_summary(parsed(filament=STIFF), tmp_path / "out")
     assert groups and (tmp_path / "out" / "summary.png").stat().st_size > 10**4
 
 
