@@ -58,7 +58,7 @@ def in_units_of(value: Numbers, target: unit.Unit, name: str) -> FloatOrArray:
     number, not finite, beyond what can be computed with, or has the dimension of something else.
     """
     # By far the most frequent, and this is asked of every filament that is added.
-    if isinstance(value, float) and math.isfinite(value):
+    if isinstance(value, float) and abs(value) <= _LARGEST:
         return float(value)
     if not isinstance(value, unit.Quantity) and isinstance(value, (list, tuple)):
         if any(isinstance(item, unit.Quantity) for item in value):
