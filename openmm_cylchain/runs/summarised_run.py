@@ -1,7 +1,7 @@
 """A run with its summary and figure: what the command ``run`` does, and each run of a scan."""
 
 from .linker_summary import summarise_linkers
-from .measures import measure
+from .measures import course, load_run, measure
 from .run import run
 from .run_directory import RunDirectory
 from .summary import load_trajectory, summarise
@@ -19,8 +19,9 @@ def run_with_summary(configuration, output, resume=False):
     trajectory = load_trajectory(configuration, directory)
     groups = summarise(configuration, trajectory)
     linkers = summarise_linkers(configuration, directory)
-    measures = measure(configuration, directory)
+    own = load_run(directory)
+    measures = measure(configuration, own)
     # The summary comes last: a run that has one is complete.
-    write_figure(configuration, directory, trajectory)
+    write_figure(configuration, directory, trajectory, course(configuration, own))
     write_summary(configuration, directory, groups, linkers, measures)
     return groups, linkers, measures

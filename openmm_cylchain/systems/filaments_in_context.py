@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,7 +27,16 @@ from ..kinetics.linker_table import LinkerTable
 from ..kinetics.linkers import LinkerPulls
 from ..mechanics.flow import Flow
 from ..mechanics.tension import components_along, filament_tensions
-from ..units.quantities import FORCE, LENGTH, STIFFNESS, in_units_of, positive, shown, vector, whole_number
+from ..units.quantities import (
+    FORCE,
+    LENGTH,
+    STIFFNESS,
+    in_units_of,
+    positive,
+    vector,
+    whole_number,
+    whole_numbers,
+)
 from ..units.types import Indices, Scalar, Vector, Vectors
 
 
@@ -257,8 +265,7 @@ class FilamentsInContext:
         points : (tethers, 3) length
         """
         points = np.asarray(in_units_of(points, LENGTH, "points"))
-        if not isinstance(tethers, (Sequence, np.ndarray)) or np.ndim(tethers) != 1:
-            raise InputError(f"tethers must be a sequence of numbers of tethers, but is {shown(tethers)}.")
+        tethers = whole_numbers(tethers, 0, "tethers")
         if points.shape != (len(tethers), 3):
             raise InputError(f"points must have the shape ({len(tethers)}, 3), but have {points.shape}.")
         old = self.tethers()
