@@ -195,7 +195,7 @@ def set_table(force: Any, context: openmm.Context, table: LinkerTable) -> None:
 def pulls_of(
     force: Any,
     table: LinkerTable,
-    filaments: Sequence[Filament],
+    contours: Sequence[FloatArray],
     nodes: Sequence[IntArray],
     positions: FloatArray,
     box: FloatArray | None,
@@ -203,7 +203,7 @@ def pulls_of(
 ) -> LinkerPulls:
     """What the springs of linkers do; arguments are those of ``places_of``."""
     pulling = table.held == 2
-    places = places_of(force, table, filaments, nodes, positions, box, curves)[pulling]
+    places = places_of(force, table, contours, nodes, positions, box, curves)[pulling]
     vectors = places[:, 1] - places[:, 0]
     distance = np.linalg.norm(vectors, axis=1)
     parameters = np.array([force.getLinkerTypeParameters(i)[2:4] for i in range(force.getNumLinkerTypes())])
@@ -217,7 +217,7 @@ def pulls_of(
 def places_of(
     force: Any,
     table: LinkerTable,
-    filaments: Sequence[Filament],
+    contours: Sequence[FloatArray],
     nodes: Sequence[IntArray],
     positions: FloatArray,
     box: FloatArray | None,
@@ -225,19 +225,20 @@ def places_of(
 ) -> FloatArray:
     """Where the two ends of linkers hold something: (n, 2, 3) in nm, NaN where they do not.
 
-    By the particles of the nodes of each filament, all positions in nm, and the curves of beam elements. In a box,
-    (3, 3), a second end is at the nearest image of its first one.
+    By where the segments of each filament begin along it, and its end (``contours_in``), the particles of its nodes,
+    all positions in nm, and the curves of beam elements. In a box, (3, 3), a second end is at the nearest image of its
+    first one.
     """
     places = np.full((len(table), 2, 3), np.nan)
     chains, along = np.asarray(table.filaments), np.asarray(table.arc_lengths)
-    contours = [contour_of(filament) for filament in filaments]
-    minus = np.concatenate([own[: filament.segments] for filament, own in zip(filaments, nodes)])
-    plus = np.concatenate([np.roll(own, -1)[: filament.segments] for filament, own in zip(filaments, nodes)])
+    minus = np.concatenate([own[: len(contour) - 1] for contour, own in zip(contours, nodes)])
+    plus = np.concatenate([np.roll(own, -1)[: len(contour) - 1] for contour, own in zip(contours, nodes)])
     # Of all filaments, one behind the other.
-    begins = np.cumsum([0.0, *(contour[-1] for contour in contours)])
+    begins = np.cumsum([0.0, *(contour[-1] - contour[0] for contour in contours)])
+    begins = begins[:-1] - [contour[0] for contour in contours]
     starts = np.concatenate([begin + contour[:-1] for begin, contour in zip(begins, contours)])
     sizes = np.concatenate([np.diff(contour) for contour in contours])
-    first = np.cumsum([0, *(filament.segments for filament in filaments)])
+    first = np.cumsum([0, *(len(contour) - 1 for contour in contours)])
     for side in (0, 1):
         on = chains[:, side] >= 0
         chain = chains[on, side]

@@ -22,7 +22,7 @@ from ..kinetics.binding_force import (
     set_table,
     table_of,
 )
-from ..kinetics.growth_force import FilamentGrowth, growth_of
+from ..kinetics.growth_force import FilamentGrowth, contours_in, growth_of
 from ..kinetics.linker_table import LinkerTable
 from ..kinetics.linkers import LinkerPulls
 from ..mechanics.flow import Flow
@@ -281,7 +281,8 @@ class FilamentsInContext:
         positions = state.getPositions(asNumpy=True)._value
         box = state.getPeriodicBoxVectors(asNumpy=True)._value if force.usesPeriodicBoundaryConditions() else None
         table, curves = self.linkers(), BeamCurves.of_system(self._context.getSystem())
-        return force, table, self._placed.filaments, self._placed.node_indices, positions, box, curves
+        contours = contours_in(self._context, self._placed.filaments)
+        return force, table, contours, self._placed.node_indices, positions, box, curves
 
     def _binding_force(self):
         force = find_binding_force(self._context.getSystem())

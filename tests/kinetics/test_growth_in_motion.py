@@ -181,3 +181,26 @@ def test_contacts_links_walls_and_growth_together_keep_the_equilibrium_of_filame
     assert (events.gained + events.lost).sum() > 4000 and np.mean(pulling) > 10
     mean_within(lengths, 0.5, 0.1)
     mean_within(bends, 1.0, 0.1)
+
+
+def test_linkers_are_where_they_hold_filaments_that_have_grown():
+    filaments = Filaments(1e-2 * unit.pascal * unit.second, TEMPERATURE)
+    for number in range(3):
+        options = growth((6e3, 4e3), (5e3, 4e3), longest=1.5 * unit.micrometer)
+        filaments.add_equilibrium(ACTIN, 4, number, [0.0, 20.0 * number, 0.0], direction=[1, 0, 0], growth=options)
+    hand = Hand(binding_rate=5e4 / unit.second, reach=40.0, unbinding_rate=100.0 / unit.second)
+    filaments.add_linkers(Crosslinker(name="link", hands=(hand, hand), stiffness=0.06), 200, volume=1e6)
+    topology, system, positions = filaments.build()
+    context, integrator = simulate(filaments, system, positions, 5.0 * unit.microsecond)
+    integrator.step(2000)
+    inside = filaments.in_context(context)
+    growth_now, table, pulls = inside.growth(), inside.linkers(), inside.linker_pulls()
+    assert len(pulls.numbers) > 10 and np.ptp(growth_now.monomers[:, 0]) > 0
+    for filament, along in zip(table.filaments.ravel(), table.arc_lengths.ravel()):
+        if filament >= 0:
+            first, last = MONOMER * growth_now.monomers[filament]
+            assert first - 1e-9 <= along <= last + 1e-9
+    # Their energy is that of what has no energy of chains.
+    stretching, bending = chain_force(system).computeEnergies(context)
+    energy = context.getState(energy=True).getPotentialEnergy() - stretching - bending
+    assert 0.5 * 0.06 * np.sum(pulls.lengths**2) == pytest.approx(energy._value, rel=1e-9)
