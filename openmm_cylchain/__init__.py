@@ -153,6 +153,7 @@ __all__ = [
     "random_points_on",
     "recommended_time_step",
     "remove_jumps",
+    "rendering",
     "scans",
     "share_exclusions",
     "stability_bounds",
@@ -167,12 +168,12 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from . import analysis, scans, theory
+    from . import analysis, rendering, scans, theory
 else:
 
     def __getattr__(name: str) -> ModuleType:
         # Loaded when they are asked for: what they import takes longer than all else, and few simulations need it.
-        if name in ("analysis", "scans", "theory"):
+        if name in ("analysis", "rendering", "scans", "theory"):
             return importlib.import_module(f".{name}", __name__)
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

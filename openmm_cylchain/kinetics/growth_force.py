@@ -11,10 +11,11 @@ from openmm import unit
 from ..engine_choice import load_plugin
 from ..filaments.filament import Filament
 from ..filaments.filament_type import FilamentType
-from ..filaments.grown import count_nodes_of_monomers
+from ..filaments.grown import count_nodes_of_monomers, rest_lengths
 from ..filaments.growth import joints_by_monomers, segments_by_monomers
 from ..units.quantities import AVOGADRO, LENGTH, NUMBER_DENSITY
-from ..units.types import IntArray
+from ..units.types import FloatArray, IntArray
+from .first_places import contour_of
 
 GROWTH_FORCE_NAME = "Growth"
 
@@ -121,3 +122,18 @@ def growth_of(context: openmm.Context, filaments: Sequence[Filament]) -> Filamen
         counts[:, :, 2],
         unit.Quantity(molar, NUMBER_DENSITY * unit.mole).in_units_of(unit.molar),
     )
+
+
+def contours_in(context: openmm.Context, filaments: Sequence[Filament]) -> list[FloatArray]:
+    """Where the segments of filaments in a Context begin along them, with segments at rest, and their ends: a list of
+    (segments + 1,) arrays in nm. Those that grow begin where their minus ends have grown to."""
+    contours = [contour_of(filament) for filament in filaments]
+    if all(filament.growth is None for filament in filaments):
+        return contours
+    present = growth_of(context, filaments)
+    for number, monomers in zip(present.filaments, present.monomers):
+        filament = filaments[number]
+        length = filament.growth.monomers.length
+        rest = rest_lengths(monomers, filament.growth.monomers_per_segment(filament.type), length)
+        contours[number] = monomers[0] * length + np.concatenate([[0.0], np.cumsum(rest)])
+    return contours

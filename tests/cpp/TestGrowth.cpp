@@ -194,7 +194,7 @@ static void checkMean(double expected, const Mean& found, double power, const st
 
 /** Rates, and energies of lengths and bends, of chains that have grown and shrunk, at a step of so many events. */
 static void checkFreeEnds(const Weights& weights, double events) {
-    const int number = 3000;
+    const int number = 1800;
     mt19937_64 generator = generatorOf(5);
     Growing all;
     all.system.tables = {makeTable(hasRange(weights.stretching))};
@@ -279,7 +279,7 @@ static void checkRodBeforeWall(double events) {
     const double stepSize = events/(1+z);
     const int steps = max(1.0, 4/stepSize);
     for (int block = -2; block < blocks; block++)
-        for (int sample = 0; sample < 60; sample++) {
+        for (int sample = 0; sample < 25; sample++) {
             for (int i = 0; i < steps; i++)
                 growth.advance(all.state, {KT, 4.0/steps, 9}, all.chains, all.x.data(), {&wall}, changed);
             for (const MonomerRange& range : all.state.ranges)
@@ -357,7 +357,7 @@ static void testPool() {
     vector<int> changed;
     for (int block = 0; block < 40; block++) {
         Mean one, other;
-        for (int i = 0; i < 4000; i++) {
+        for (int i = 0; i < 2500; i++) {
             growth.advance(all.state, {KT, 5, 3}, all.chains, all.x.data(), {}, changed);
             one.add(all.state.ranges[0].size());
             other.add(all.state.ranges[1].size());
@@ -366,8 +366,8 @@ static void testPool() {
         ofFirst.add(one.mean());
         ofSecond.add(other.mean());
     }
-    checkMean(first/norm, ofFirst, 0.05, "the first chain of a pool");
-    checkMean(second/norm, ofSecond, 0.05, "the second chain of a pool");
+    checkMean(first/norm, ofFirst, 0.07, "the first chain of a pool");
+    checkMean(second/norm, ofSecond, 0.07, "the second chain of a pool");
 }
 
 /** What comes to one chain does not depend on others. */
@@ -408,7 +408,7 @@ static void testContacts() {
     mt19937_64 generator = generatorOf(8);
     normal_distribution<double> normal;
     int touching = 0, passing = 0;
-    for (int round = 0; round < 4000; round++) {
+    for (int round = 0; round < 2000; round++) {
         // Chains that wind through a small ball, and spheres.
         vector<vector<Vec3d> > nodes;
         const int numChains = 5;
@@ -492,7 +492,7 @@ static void testContacts() {
         checkClose(-difference, contacts.findChange(back), 1+fabs(energy), 1e-9,
                 "the contacts of an end that goes back");
     }
-    check(touching > 700 && passing > 50, "too few contacts: "+to_string(touching)+", "+to_string(passing));
+    check(touching > 350 && passing > 25, "too few contacts: "+to_string(touching)+", "+to_string(passing));
 }
 
 /** The change at an end is that of the energy of all links, whose places stay where they are along chains. */

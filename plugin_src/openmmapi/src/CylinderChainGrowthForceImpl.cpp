@@ -187,7 +187,10 @@ void CylinderChainGrowthForceImpl::updateContextState(ContextImpl& context, bool
             to_string(failed == -1 ? -1 : growing[failed])+": use a smaller step, or look at the rates");
     if (changed.empty())
         return;
-    chains->haveGrown(context);
+    vector<int> numbers(changed);
+    for (int& number : numbers)
+        number = growing[number];
+    chains->haveGrown(context, numbers);
     for (CouplingForceImpl* coupling : couplings)
         coupling->chainsHaveGrown(context, list);
     const bool otherNodes = any_of(changed.begin(), changed.end(), [&] (int i) {
@@ -237,7 +240,7 @@ void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
     state = replaced;
     for (size_t i = 0; i < growing.size(); i++)
         cylchain::setMonomers(list.getChain(growing[i]), system.tables[system.chains[i].table], state.ranges[i]);
-    chains->haveGrown(*context);
+    chains->haveGrown(*context, growing);
     setSpareNodes();
     for (CouplingForceImpl* coupling : couplings)
         coupling->chainsHaveGrown(*context, list);
