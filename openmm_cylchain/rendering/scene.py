@@ -152,8 +152,9 @@ class Scene:
 
 
 def has_polarity(run: Run) -> bool:
-    """Whether the last nodes of filaments are marked: where motors walk to them."""
-    return any(own.motor for own in run.linker_types) and not all(own.ring for own in run.filaments)
+    """Whether the last nodes of filaments are marked: where motors walk to them, or filaments grow."""
+    polar = any(own.motor for own in run.linker_types) or any(own.monomer_length for own in run.filaments)
+    return polar and not all(own.ring for own in run.filaments)
 
 
 def cut_at_faces(ends: FloatArray, box: FloatArray) -> tuple[FloatArray, IntArray]:

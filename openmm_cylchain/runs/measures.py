@@ -116,7 +116,7 @@ def _of_networks(configuration, run, frames):
     if free:
         kT = thermal_energy(configuration.solvent.temperature)
         gap = min(kind.rest_length + 2.0 * math.sqrt(kT / kind.stiffness) for kind in free)
-        overlap = _BUNDLE_OVERLAP * min(_length(own) for own in run.filaments)
+        overlap = _BUNDLE_OVERLAP * _shortest(run)
         try:
             yield BUNDLED, [_bundled(run, frame, gap, overlap) for frame in frames]
         except InputError:
@@ -127,8 +127,12 @@ def _of_networks(configuration, run, frames):
         yield GYRATION, [_radius(run, frame) for frame in frames]
 
 
-def _length(filament):
-    return float(filament.type.segment_lengths(filament.segments, filament.ring).sum())
+def _shortest(run):
+    # At rest, and of filaments that grow at the start.
+    lengths = [
+        own.type.segment_lengths(own.segments, own.ring).sum() for own in run.filaments if not own.monomer_length
+    ]
+    return float(min([*lengths, *(run.growth["length (nm)"][0] if run.growth else ())]))
 
 
 def _order(run, frame):

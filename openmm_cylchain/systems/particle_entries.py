@@ -125,8 +125,11 @@ def add_noninteracting_entries(
     coinciding : pairs of int
         Particles of filaments that may be in one place.
     """
-    pairs, added = list(coinciding), range(existing, system.getNumParticles())
-    for force in (own for outer in system.getForces() for own in _with_those_within(outer)):
+    added = range(existing, system.getNumParticles())
+    forces = [own for outer in system.getForces() for own in _with_those_within(outer)]
+    # Spare nodes have so many pairs that they are counted out only where a force wants them.
+    pairs = list(coinciding) if any(type(force).__name__ in _EXCLUSIONS for force in forces) else []
+    for force in forces:
         kind = type(force).__name__
         if kind in _ENTRIES:
             _ENTRIES[kind](force, added)

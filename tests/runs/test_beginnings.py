@@ -80,7 +80,10 @@ def test_dry_run(tmp_path, capsys):
     ("text", "tables"),
     [
         (EVERYTHING, ("energies.csv", "linkers.csv", "linkers.npy", "wall_forces.csv", "contact_forces.csv")),
-        (GROWING, ("energies.csv", "growth.csv", "wall_forces.csv", "contact_forces.csv")),
+        (
+            GROWING,
+            ("energies.csv", "growth.csv", "linkers.csv", "linkers.npy", "wall_forces.csv", "contact_forces.csv"),
+        ),
     ],
     ids=["everything", "growing"],
 )

@@ -1,20 +1,33 @@
 """Filaments that grow in runs from files: what is built, what is refused, and what a run writes of them."""
 
+import json
 import re
 
+import gsd.hoomd
 import numpy as np
 import openmm
 import pytest
 from openmm import unit
 
-from openmm_cylchain import ACTIN_ATP, F_ACTIN, Filaments, Growth, InputError, MonomerPool, Monomers, analysis
+from openmm_cylchain import (
+    ACTIN_ATP,
+    F_ACTIN,
+    Filaments,
+    Growth,
+    InputError,
+    MonomerPool,
+    Monomers,
+    RunReporter,
+    analysis,
+)
 from openmm_cylchain.cli import main
 from openmm_cylchain.output.read_tables import read_reports, read_table
+from openmm_cylchain.rendering.scene import COLORINGS, Look, has_polarity, make_scene
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration
 from openmm_cylchain.runs.growth_summary import free_rate
 from openmm_cylchain.runs.initial_state import build_system
 from openmm_cylchain.runs.relaxation import relaxed_positions
-from openmm_cylchain.runs.run import create_simulation
+from openmm_cylchain.runs.run import begin, create_simulation
 from support.configurations import GROWING
 
 HEAD = '[solvent]\ntemperature = "298 K"\nviscosity = "1 mPa*s"\n'
@@ -110,7 +123,6 @@ NAMED = MONOMERS + 'name = "other"\n'
         ("a friction_length that is a length", (), {"filament": FILAMENT + GROWTH + 'friction_length = "filament"\n'}),
         ("engine has no filaments that grow", (), {"simulation": TAIL + 'engine = "portable"\n'}),
         ("scheme has no filaments that grow", (), {"simulation": TAIL + 'scheme = "midpoint"\n'}),
-        ("linkers do not bind to filaments that grow yet", (LINKERS + 'volume = "1 um^3"\ncount = 3\n',), {}),
         (
             "anchors must be points where filaments grow",
             ('[[filament]]\ntype = "MICROTUBULE"\nsegments = 2\n', LINKERS, "anchors = [0, 1, 2]\n")
@@ -187,6 +199,18 @@ def test_run_says_how_far_filaments_have_grown(directory, capsys):
     np.testing.assert_allclose(free[0] - free[-1], gained / volume / 602.214076, rtol=1e-6)
 
 
+def test_a_run_reporter_writes_the_same(directory, tmp_path):
+    configuration = parse_configuration(GROWING)
+    simulation, built = create_simulation(configuration)
+    begin(configuration, simulation, built)
+    simulation.reporters.append(RunReporter(tmp_path / "out", 50, built.filaments))
+    simulation.step(500)
+    for name in ("growth.csv", "energies.csv"):
+        text = (tmp_path / "out" / name).read_text()
+        assert (directory / name).read_text().startswith(text) and text.count("\n") > 10, name
+    assert len(analysis.load(tmp_path / "out").growth["nodes"]) == 11
+
+
 def test_energies_are_those_of_the_segments_that_there_are(directory):
     table, energies = read_reports(directory / "growth.csv"), read_table(directory / "energies.csv")
     segments = table["nodes"].sum(axis=1) - 6 + 3
@@ -216,6 +240,36 @@ def test_dry_run_says_what_is_expected(directory, capsys):
     said = capsys.readouterr().out
     assert "+579 monomers/s at the plus end and +64.2 monomers/s at the minus end, where it is free, at 50 uM" in said
     assert re.search(r"-50 monomers/s at the plus end, where it is free, at 2 uM; \d+ spare nodes each, for a", said)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("color", COLORINGS)
+def test_pictures_have_the_nodes_that_there_are(directory, color):
+    run = analysis.load(directory)
+    scene = make_scene(run, Look(color=color, diameter=0.0, linkers=False), [20])
+    tubes = scene.tubes(20)
+    segments = run.growth["nodes"][20].sum() - 6 + 3
+    assert has_polarity(run)
+    # Beside lines of the wall, and balls at plus ends.
+    assert np.sum(np.isin(np.round(tubes.radii, 6), (3.0, 12.5))) == segments
+    assert np.all(np.isfinite(tubes.colors))
+
+
+def test_exports_have_the_nodes_that_there_are(directory, tmp_path):
+    run = analysis.load(directory)
+    for kind, name in (("ovito", "a.gsd"), ("simularium", "a.simularium"), ("vmd", "a.tcl")):
+        assert main(["export", str(directory), "--format", kind, "--output", str(tmp_path / name)]) == 0
+    content = json.loads((tmp_path / "a.simularium").read_text())
+    with gsd.hoomd.open(str(tmp_path / "a.gsd")) as file:
+        for frame in (0, 20):
+            nodes = run.growth["nodes"][frame].astype(int).tolist() + [4]
+            assert np.sum(np.isin(file[frame].particles.typeid, (0, 1))) == sum(nodes)
+            assert np.sum(np.isin(file[frame].bonds.typeid, (0, 1))) == sum(nodes) - 7
+            data, place, points = content["spatialData"]["bundleData"][frame]["data"], 0, []
+            for _ in nodes:
+                points.append(int(data[place + 10]) // 3)
+                place += 11 + int(data[place + 10])
+            assert points == nodes
 
 
 def test_free_ends_treadmill_at_that_concentration():

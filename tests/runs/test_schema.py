@@ -54,7 +54,7 @@ def test_files_are_valid(text):
 
 def test_everything_has_every_table_and_the_examples_are_there():
     assert len(FILES) == 11
-    # Joints are between filaments of beam elements, and linkers do not bind to filaments that grow.
+    # Joints are between filaments of beam elements.
     tables = {table for text in (EVERYTHING, BEAMS, GROWING) for table in tomllib.loads(text)}
     assert all(kind.name in tables for kind in TABLES)
 

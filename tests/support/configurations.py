@@ -185,9 +185,9 @@ segment_length = "200 nm"
 segments = 3
 position = ["0 nm", "0 nm", "0 nm"]
 [[linkers]]
-type = "KINESIN_1"
-hand = { binds_to = "MICROTUBULE" }
-count = 20
+type = "MYOSIN_II"
+count = 200
+bound = 50
 [contacts]
 diameter = "10 nm"
 [[wall]]
@@ -204,7 +204,7 @@ platform = "CPU"
 threads = 1
 checks = false
 """
-"""Filaments that grow of monomers of two kinds, one of which becomes less, beside one that does not, in a sphere."""
+"""Filaments that grow of monomers of two kinds, one of which becomes less, beside one that does not, with linkers."""
 
 
 def placed_filaments(configuration):

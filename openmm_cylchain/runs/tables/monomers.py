@@ -11,7 +11,6 @@ from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Flag, Key, Quantity, Text, WordOrQuantity
 from ..table import TableKind
 from .couplings import group_of
-from .linkers import binds_to
 from .shapes import volume_within
 from .solvent import EDGES
 
@@ -139,8 +138,7 @@ def check_with_others(tables, configuration, settings):
     ``tables`` are the entries of all tables, by names; ``settings`` those of [simulation].
     """
     groups = configuration.filaments
-    growing = [group for group in groups if group.growth is not None]
-    if not growing:
+    if all(group.growth is None for group in groups):
         _refuse_unused(tables["monomers"])
         return
     with settings.naming():
@@ -149,12 +147,6 @@ def check_with_others(tables, configuration, settings):
     if settings["scheme"] not in (None, *IMPLICIT_SCHEMES):
         raise settings.at("scheme").error('has no filaments that grow: leave it out, or write "implicit".')
     for entries, own in zip(tables["linkers"], configuration.linkers):
-        for group in growing:
-            if binds_to(group, [own]):
-                raise entries.error(
-                    f"binds to {group.type.name}, which grows in [[filament]] number {group.table}: linkers do not "
-                    "bind to filaments that grow yet. Give its hand binds_to with other filaments."
-                )
         if own.anchors is not None and isinstance(own.anchors[0], int):
             raise entries.at("anchors").error("must be points where filaments grow, but are numbers of nodes.")
     for name, what in (("tether", "tethers do not hold"), ("pull", "constant forces do not pull at")):
