@@ -168,8 +168,8 @@ class _Segments:
 
     def __init__(self, chains):
         wrong = "chains must be int arrays, one for each chain, with the indices of two nodes or more."
+        own = _chains_of(chains) if hasattr(type(chains), "node_indices") else chains
         try:
-            own = _chains_of(chains) if hasattr(type(chains), "node_indices") else chains
             chains = [np.asarray(chain) for chain in own]
         except (TypeError, ValueError):
             raise InputError(wrong) from None
