@@ -40,8 +40,8 @@ from .errors import (
 from .filaments.attachments import Attachment
 from .filaments.filament import Filament, Tether
 from .filaments.filament_type import FilamentType
-from .filaments.growth import Growth, MonomerPool, Monomers
-from .filaments.presets import ACTIN_ATP, DSDNA, F_ACTIN, MICROTUBULE
+from .filaments.growth import DynamicInstability, Growth, MonomerPool, Monomers
+from .filaments.presets import ACTIN_ATP, DSDNA, F_ACTIN, MICROTUBULE, TUBULIN
 from .filaments.segment_place import SegmentPlace
 from .filaments.shapes import FilamentOptions
 from .kinetics.crosslinker import Crosslinker
@@ -84,6 +84,7 @@ __all__ = [
     "DSDNA_BASE_PAIRS",
     "DYNEIN",
     "Ellipsoid",
+    "DynamicInstability",
     "EndCorrections",
     "EngineWarning",
     "EquilibrationWarning",
@@ -121,6 +122,7 @@ __all__ = [
     "Slab",
     "Sphere",
     "StepCheck",
+    "TUBULIN",
     "TensionReporter",
     "Tether",
     "TetherReporter",
