@@ -40,8 +40,8 @@ from .errors import (
 from .filaments.attachments import Attachment
 from .filaments.filament import Filament, Tether
 from .filaments.filament_type import FilamentType
-from .filaments.growth import Growth, MonomerPool, Monomers
-from .filaments.presets import ACTIN_ATP, DSDNA, F_ACTIN, MICROTUBULE
+from .filaments.growth import DynamicInstability, Growth, MonomerPool, Monomers
+from .filaments.presets import ACTIN_ATP, DSDNA, F_ACTIN, MICROTUBULE, TUBULIN
 from .filaments.segment_place import SegmentPlace
 from .filaments.shapes import FilamentOptions
 from .kinetics.crosslinker import Crosslinker
@@ -85,6 +85,7 @@ __all__ = [
     "DSDNA_BASE_PAIRS",
     "DYNEIN",
     "Ellipsoid",
+    "DynamicInstability",
     "EndCorrections",
     "EngineWarning",
     "EquilibrationWarning",
@@ -123,6 +124,7 @@ __all__ = [
     "Slab",
     "Sphere",
     "StepCheck",
+    "TUBULIN",
     "TensionReporter",
     "Tether",
     "TetherReporter",

@@ -7,7 +7,10 @@ from openmm import unit
 
 from openmm_cylchain import (
     F_ACTIN,
+    MICROTUBULE,
+    TUBULIN,
     Crosslinker,
+    DynamicInstability,
     Filaments,
     Growth,
     Hand,
@@ -204,3 +207,36 @@ def test_linkers_are_where_they_hold_filaments_that_have_grown():
     stretching, bending = chain_force(system).computeEnergies(context)
     energy = context.getState(energy=True).getPotentialEnergy() - stretching - bending
     assert 0.5 * 0.06 * np.sum(pulls.lengths**2) == pytest.approx(energy._value, rel=1e-9)
+
+
+def test_microtubules_grow_and_shrink_with_the_mean_speed_of_dynamic_instability():
+    catastrophe, rescue, shrinking = 20.0, 40.0, 733.0
+    instability = DynamicInstability(
+        catastrophe_rate=catastrophe / unit.second,
+        rescue_rate=rescue / unit.second,
+        shrinking_off_rate=shrinking / unit.second,
+    )
+    # At 200 uM they gain 1736 dimers per second while they grow.
+    options = {"pool": unit.Quantity(2e-4, unit.molar), "longest": 6.0 * unit.micrometer, "minus_capped": True}
+    grows = Growth(monomers=TUBULIN, plus_instability=instability, **options)
+    segment = 200 * TUBULIN.length
+    filaments = Filaments(1e-3 * unit.pascal * unit.second, TEMPERATURE)
+    for number in range(80):
+        filaments.add_straight(
+            MICROTUBULE.with_segment_length(segment), 20, [0, 100 * number, 0], [1, 0, 0], growth=grows
+        )
+    topology, system, positions = filaments.build()
+    context, integrator = simulate(filaments, system, positions, 5.0 * unit.millisecond)
+    integrator.step(100)
+    # From when ends have forgotten that all of them grew at the start.
+    before = filaments.in_context(context).growth()
+    integrator.step(200)
+    state = filaments.in_context(context).growth()
+    speed = (state.monomers - before.monomers)[:, 1] / 1.0
+    growing = 8.9 * 200.0 - 44.0
+    mean_within(speed, (growing * rescue - shrinking * catastrophe) / (catastrophe + rescue), 0.12)
+    spread = rescue * catastrophe * (growing + shrinking) ** 2 / (catastrophe + rescue) ** 3
+    assert speed.var() == pytest.approx(2.0 * spread, rel=0.6)
+    assert state.catastrophes.sum() > 1000 and not state.catastrophes[:, 0].any()
+    assert 0.12 < state.shrinking[:, 1].mean() < 0.55
+    assert not state.gained[:, 0].any()
