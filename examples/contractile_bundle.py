@@ -29,6 +29,7 @@ from openmm_cylchain import (
     capsule_contact_force,
     filament_wall_force,
 )
+from openmm_cylchain.rendering import colors_of_filaments, spring_colors
 
 FILAMENTS = 40
 SEGMENT_LENGTH = 100.0  # nm
@@ -142,7 +143,7 @@ figure = plt.figure(figsize=(11, 6.6), layout="constrained")
 grid = figure.add_gridspec(3, 2, height_ratios=(1, 1, 2.6))
 panels = [figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, :])]
 plot, numbers = figure.add_subplot(grid[2, 0]), figure.add_subplot(grid[2, 1])
-colours = ("#c0392b", "#1f6f8b")
+colours, (of_motors, of_crosslinkers) = colors_of_filaments(2), spring_colors([True, False])
 last, table = current(simulation), here.linkers()
 pulls = here.linker_pulls()
 kinds = table.types[np.searchsorted(table.numbers, pulls.numbers)]
@@ -155,17 +156,17 @@ for axes, shape, title in zip(panels, (first, last), ("At first", f"After {time[
     axes.set(aspect="equal", xlim=(-reach, reach), ylim=(-0.14, 0.14), ylabel="y (µm)")
     axes.set_title(title, loc="left", fontsize=11)
     axes.spines[["top", "right"]].set_visible(False)
-for kind, (colour, label) in enumerate((("#f39c12", "motor"), ("0.25", "crosslinker"))):
+for kind, (colour, label) in enumerate(((of_motors, "motor"), (of_crosslinkers, "crosslinker"))):
     panels[1].plot(*pulls.places[kinds == kind, :, :2].T / 1000, color=colour, linewidth=1.0, zorder=3)
     panels[0].plot([], [], color=colour, linewidth=1.6, label=label)
 for colour, label in zip(colours, ("plus end on the right", "plus end on the left")):
     panels[0].plot([], [], color=colour, linewidth=1.6, label=label)
 panels[0].legend(frameon=False, ncols=4, loc="lower right", bbox_to_anchor=(1.0, 1.0))
 panels[1].set_xlabel("x (µm)")
-plot.plot(time, 100 * (1 - lengths / lengths[0]), color="#c0392b", linewidth=2, label="motors walk")
+plot.plot(time, 100 * (1 - lengths / lengths[0]), color=of_motors, linewidth=2, label="motors walk")
 plot.plot(time, 100 * (1 - passive_lengths / lengths[0]), "--", color="0.5", linewidth=2, label="no motor walks")
 plot.set(xlabel="time (s)", ylabel="shortening (%)", xlim=(0, time[-1]))
-for kind, (colour, label) in enumerate((("#f39c12", "motors"), ("0.25", "crosslinkers"))):
+for kind, (colour, label) in enumerate(((of_motors, "motors"), (of_crosslinkers, "crosslinkers"))):
     numbers.plot(time, bound[:, kind], color=colour, linewidth=1.8, label=f"{label}, of {(MOTORS, CROSSLINKERS)[kind]}")
 numbers.set(xlabel="time (s)", ylabel="with both hands bound", xlim=(0, time[-1]), ylim=(0, None))
 for axes in (plot, numbers):

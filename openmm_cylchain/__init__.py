@@ -40,8 +40,8 @@ from .errors import (
 from .filaments.attachments import Attachment
 from .filaments.filament import Filament, Tether
 from .filaments.filament_type import FilamentType
-from .filaments.growth import Growth, MonomerPool, Monomers
-from .filaments.presets import ACTIN_ATP, DSDNA, F_ACTIN, MICROTUBULE
+from .filaments.growth import DynamicInstability, Growth, MonomerPool, Monomers
+from .filaments.presets import ACTIN_ATP, DSDNA, F_ACTIN, MICROTUBULE, TUBULIN
 from .filaments.segment_place import SegmentPlace
 from .filaments.shapes import FilamentOptions
 from .kinetics.crosslinker import Crosslinker
@@ -85,6 +85,7 @@ __all__ = [
     "DSDNA_BASE_PAIRS",
     "DYNEIN",
     "Ellipsoid",
+    "DynamicInstability",
     "EndCorrections",
     "EngineWarning",
     "EquilibrationWarning",
@@ -123,6 +124,7 @@ __all__ = [
     "Slab",
     "Sphere",
     "StepCheck",
+    "TUBULIN",
     "TensionReporter",
     "Tether",
     "TetherReporter",
@@ -153,6 +155,7 @@ __all__ = [
     "random_points_on",
     "recommended_time_step",
     "remove_jumps",
+    "rendering",
     "scans",
     "share_exclusions",
     "stability_bounds",
@@ -167,12 +170,12 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from . import analysis, scans, theory
+    from . import analysis, rendering, scans, theory
 else:
 
     def __getattr__(name: str) -> ModuleType:
         # Loaded when they are asked for: what they import takes longer than all else, and few simulations need it.
-        if name in ("analysis", "scans", "theory"):
+        if name in ("analysis", "rendering", "scans", "theory"):
             return importlib.import_module(f".{name}", __name__)
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

@@ -3,7 +3,9 @@
 import os
 
 # Tests run side by side: threads of each would wait for those of others. Libraries ask for this when they are loaded.
+# What several threads must not change is tested with numbers of them that a Context is given.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OPENMM_CPU_THREADS", "1")
 
 # ruff: noqa: E402
 import re
@@ -14,6 +16,7 @@ import pytest
 
 import openmm_cylchain
 from openmm_cylchain.engine_choice import why_no_python_forces
+from support import run_figures
 from support.platforms import COMPILED_PLATFORMS, ENGINES, GPU_NAMES, NOT_TESTED, PLATFORMS
 
 
@@ -77,6 +80,20 @@ def _skipped_without_python_forces():
         if reason is None or reason not in str(error):
             raise
         pytest.skip(reason)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def blank_figures_of_runs():
+    """Figures of runs are rendered where tests look at them, and in processes of their own."""
+    with run_figures.blank():
+        yield
+
+
+@pytest.fixture(scope="module")
+def rendered_figures_of_runs():
+    """Figures of runs are rendered in a test file."""
+    with run_figures.rendered():
+        yield
 
 
 @pytest.fixture(params=PLATFORMS, scope="session")

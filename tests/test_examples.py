@@ -37,9 +37,6 @@ CASES = [
 AT_ONCE = (
     "lennard_jones_box",
     "two_filament_types",
-    "tumbling_in_shear",
-    "periodic_box",
-    "dense_network",
     "gliding_assay",
 )
 # What an example writes beside the files that all of them write.

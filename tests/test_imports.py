@@ -7,7 +7,7 @@ import pytest
 
 import openmm_cylchain
 
-LATE = ("analysis", "scans", "theory")
+LATE = ("analysis", "rendering", "scans", "theory")
 SLOW = (
     "matplotlib",
     "mdtraj",
@@ -32,6 +32,12 @@ def test_what_is_slow_is_not_loaded():
     loaded = in_a_fresh_interpreter("import openmm_cylchain, sys; print(*sys.modules)")
     assert "openmm_cylchain.systems.filaments" in loaded
     assert not {*SLOW} & {*loaded}
+
+
+def test_the_command_starts_without_what_is_slow():
+    loaded = in_a_fresh_interpreter("import openmm_cylchain.cli, sys; print(*sys.modules)")
+    assert "openmm_cylchain.scans.command" in loaded
+    assert not {name for name in SLOW if not name.startswith("openmm_cylchain.")} & {*loaded}
 
 
 @pytest.mark.parametrize("name", LATE)

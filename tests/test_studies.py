@@ -8,7 +8,10 @@ import pytest
 from support.repository import ROOT
 
 
-@pytest.mark.parametrize("arguments", [("benchmark", "engines", "--json"), ("reproduce", "nobody1999", "--output")])
+@pytest.mark.parametrize(
+    "arguments",
+    [("benchmark", "engines", "--json"), pytest.param(("reproduce", "nobody1999", "--output"), marks=pytest.mark.slow)],
+)
 def test_running_the_folder(arguments, tmp_path):
     """What is wrong is refused before anything is measured, in the words of openmm-cylchain."""
     command = [sys.executable, "studies", *arguments, str(tmp_path)]

@@ -17,9 +17,10 @@ TYPED = (
     "time_steps",
     "analysis",
     "systems",
+    "rendering",
 )
 MODULES = [
-    *(path for folder in TYPED for path in sorted((PACKAGE / folder).glob("*.py"))),
+    *(path for folder in TYPED for path in sorted((PACKAGE / folder).glob("*.py")) if path.stem != "command"),
     PACKAGE / "engine_choice.py",
     PACKAGE / "engines" / "protocol.py",
 ]

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import EquilibrationWarning, InputError
 from ..filaments.topology_nodes import ring_filaments
-from ..units.quantities import DIMENSIONLESS, LENGTH, in_units_of, positive, shown, whole_number
+from ..units.quantities import DIMENSIONLESS, LENGTH, in_units_of, positive, shown, true_or_false, whole_number
 from ..units.types import FloatArray, Indices, IntArray, Scalar
 from .filament_shapes import (
     contour_lengths,
@@ -162,7 +162,7 @@ def persistence_length(
 
 def _are_planar(trajectory, filaments, planar):
     if planar is not None:
-        return bool(planar)
+        return true_or_false(planar, "planar")
     flat = {bool(np.all(nodes[..., 2] == nodes[0, 0, 2])) for nodes in node_positions(trajectory, filaments)}
     if len(flat) > 1:
         raise InputError("Some of the filaments are planar, and others are not: select those of one kind.")

@@ -20,7 +20,8 @@ from ..errors import InputError
 from ..filaments.beam_refusals import refuse_beams
 from ..filaments.collection import FilamentCollection
 from ..filaments.growth_refusals import refuse_growth
-from ..units.quantities import LENGTH, in_units_of, positive
+from ..mechanics.geometry import cross
+from ..units.quantities import LENGTH, in_units_of, positive, shown
 from ..units.types import BoolArray, BoxVectors, FloatArray, IntArray, Scalar, Vectors
 
 # Of the width of a bracket around the time of a crossing: 2^-52.
@@ -166,9 +167,14 @@ class _Segments:
     # The segments of all chains, one after another.
 
     def __init__(self, chains):
-        chains = [np.asarray(chain) for chain in (_chains_of(chains) if hasattr(chains, "node_indices") else chains)]
+        wrong = "chains must be int arrays, one for each chain, with the indices of two nodes or more."
+        own = _chains_of(chains) if hasattr(type(chains), "node_indices") else chains
+        try:
+            chains = [np.asarray(chain) for chain in own]
+        except (TypeError, ValueError):
+            raise InputError(wrong) from None
         if not chains or any(c.ndim != 1 or len(c) < 2 or c.dtype.kind not in "iu" for c in chains):
-            raise InputError("chains must be int arrays, one for each chain, with the indices of two nodes or more.")
+            raise InputError(wrong)
         self._minus = np.concatenate([chain[:-1] for chain in chains])
         self._plus = np.concatenate([chain[1:] for chain in chains])
         self._chain = np.repeat(np.arange(len(chains)), [len(chain) - 1 for chain in chains])
@@ -253,9 +259,13 @@ def _chains_of(filaments):
 def _box(box_vectors):
     if box_vectors is None:
         return None
-    box = np.array([in_units_of(edge, LENGTH, "box_vectors") for edge in box_vectors])
+    try:
+        edges = list(box_vectors)
+    except TypeError:
+        edges = []
+    box = np.asarray(in_units_of(edges, LENGTH, "box_vectors"))
     if box.shape != (3, 3):
-        raise InputError(f"box_vectors must be three vectors, but have the shape {box.shape}.")
+        raise InputError(f"box_vectors must be three vectors, but are {shown(box_vectors)}.")
     if not abs(np.linalg.det(box)) > 0.0:
         raise InputError("box_vectors must span a volume.")
     return box
@@ -315,8 +325,8 @@ def _dot(a, b):
 def _volume_polynomial(start, end):
     # Coefficients of w . (p x q), the lowest first, for p, q and w that change at constant speed.
     (p, q, w), (dp, dq, dw) = start, (b - a for a, b in zip(start, end))
-    normal = np.cross(p, q)
-    first, second = np.cross(dp, q) + np.cross(p, dq), np.cross(dp, dq)
+    normal = cross(p, q)
+    first, second = cross(dp, q) + cross(p, dq), cross(dp, dq)
     return (
         _dot(w, normal),
         _dot(dw, normal) + _dot(w, first),
@@ -333,7 +343,7 @@ def _in_one_plane(volume, start, end):
     flat = np.flatnonzero(np.max(np.abs(volume), axis=0) <= 40.0 * _PLANAR * length**3)
     vectors, length = vectors[flat], length[flat]
     longest = vectors[np.arange(len(flat)), squares[flat].argmax(axis=1)]
-    across = np.cross(longest[:, None], vectors)
+    across = cross(longest[:, None], vectors)
     areas = np.linalg.norm(across, axis=2)
     widest = areas.argmax(axis=1)
     areas = areas[np.arange(len(flat)), widest]
@@ -350,7 +360,7 @@ def _passages_of_end(side, place, normals, start, end):
     along = [one[1 - side] for one in (start, end)]
     ends = [place * p - w if side == 0 else w + place * q for p, q, w in (start, end)]
     (a, b), (da, db) = (along[0], ends[0]), (along[1] - along[0], ends[1] - ends[0])
-    c0, c1, c2 = np.cross(a, b), np.cross(a, db) + np.cross(da, b), np.cross(da, db)
+    c0, c1, c2 = cross(a, b), cross(a, db) + cross(da, b), cross(da, db)
     index, times = _sign_changes(_dot(normals, c0), _dot(normals, c1), _dot(normals, c2), np.zeros(len(normals)))
     line, r = a[index] + times[:, None] * da[index], b[index] + times[:, None] * db[index]
     foot = _dot(line, r) / _dot(line, line)
@@ -387,8 +397,8 @@ def _sign_changes(c0, c1, c2, c3):
 
 def _meeting_place(p, q, w):
     # Where two lines in a plane meet, in units of p and q: a p - b q = w. Parallel ones do not.
-    normal = np.cross(p, q)
+    normal = cross(p, q)
     square = _dot(normal, normal)
     with np.errstate(all="ignore"):
-        a, b = _dot(np.cross(w, q), normal) / square, _dot(np.cross(w, p), normal) / square
+        a, b = _dot(cross(w, q), normal) / square, _dot(cross(w, p), normal) / square
     return np.nan_to_num(np.stack([a, b], axis=1), nan=-1.0)

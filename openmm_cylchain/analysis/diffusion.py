@@ -8,7 +8,8 @@ import mdtraj
 import numpy as np
 
 from ..errors import InputError
-from ..units.quantities import TIME, positive, whole_number
+from ..filaments.topology_nodes import require_trajectory
+from ..units.quantities import TIME, numbers_of, positive, true_or_false
 from ..units.types import FloatArray, Indices, IntArray, Scalar
 from .filament_shapes import (
     center_of_segments,
@@ -72,8 +73,10 @@ def mean_square_displacement(
     -------
     MeanSquareDisplacement
     """
+    require_trajectory(trajectory)
     refuse_rings(trajectory, filaments, "axis")
     refuse_spare_nodes(trajectory, filaments, "displacements of the same nodes")
+    window_average = true_or_false(window_average, "window_average")
     lags = _checked_lags(lags, trajectory.n_frames)
     step = _frame_spacing(trajectory) if time_step is None else positive(time_step, TIME, "time_step")
     results = np.stack(
@@ -92,7 +95,7 @@ def _checked_lags(lags: Indices | None, frames: int) -> IntArray:
         raise InputError("A mean square displacement needs at least two frames.")
     if lags is None:
         return np.unique(np.concatenate([[0], np.geomspace(1, max(1, frames // 2), 50).round()])).astype(int)
-    lags = np.array([whole_number(lag, 0, "a lag") for lag in np.atleast_1d(lags).tolist()])
+    lags = np.array(numbers_of(lags, 0, "lags"), dtype=int)
     if np.any(lags >= frames):
         raise InputError(f"lags must be below the number of frames, {frames}, but go up to {lags.max()}.")
     return lags

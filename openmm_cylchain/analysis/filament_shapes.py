@@ -26,8 +26,8 @@ from ..beams.curve import arc_lengths, curve_points
 from ..errors import InputError
 from ..filaments.filament import CONTROL_POINT_NAME
 from ..filaments.spare_nodes import count_nodes, without_spare_nodes
-from ..filaments.topology_nodes import filament_nodes, ring_filaments
-from ..units.quantities import whole_number
+from ..filaments.topology_nodes import filament_nodes, require_trajectory, ring_filaments
+from ..units.quantities import numbers_of
 from ..units.types import FloatArray, Indices
 
 _POINTS_OF_ELEMENT = 8
@@ -40,6 +40,7 @@ def node_positions(trajectory: mdtraj.Trajectory, filaments: int | Indices | Non
 
 def _particles(trajectory, filaments):
     # With spare nodes, in the precision of the trajectory.
+    require_trajectory(trajectory)
     nodes = filament_nodes(trajectory)
     return [trajectory.xyz[:, nodes[index]] for index in selected_indices(filaments, len(nodes))]
 
@@ -48,6 +49,7 @@ def control_point_positions(
     trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None
 ) -> list[FloatArray | None]:
     """Positions of the control points: a list of (frames, nodes, 3) arrays in nm, None without beam elements."""
+    require_trajectory(trajectory)
     nodes, positions = filament_nodes(trajectory), []
     for index in selected_indices(filaments, len(nodes)):
         chain = trajectory.topology.atom(int(nodes[index][0])).residue.chain
@@ -88,9 +90,7 @@ def selected_indices(filaments: int | Indices | None, count: int) -> Sequence[in
     """Indices of the filaments that are meant among so many; InputError for others."""
     if filaments is None:
         return range(count)
-    if isinstance(filaments, (int, np.integer)):
-        filaments = [filaments]
-    selected = [whole_number(index, 0, "an index in filaments") for index in filaments]
+    selected = numbers_of(filaments, 0, "filaments")
     if not selected:
         raise InputError("filaments selects no filament.")
     if max(selected) >= count:

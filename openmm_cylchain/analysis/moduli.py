@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..units.quantities import thermal_energy, whole_number
+from ..units.quantities import numbers_of, thermal_energy, whole_number
 from ..units.types import FloatArray, Indices, Scalar
 from .runs import Run, volume_of
 from .stress import stress
@@ -72,8 +72,13 @@ def relaxation_modulus(
     """
     room = volume_of(run, volume)
     chosen = np.arange(len(run))
-    chosen = chosen[frames] if frames is None or isinstance(frames, slice) else chosen[np.atleast_1d(frames)]
-    chosen = chosen.reshape(-1)
+    if isinstance(frames, slice):
+        chosen = chosen[frames]
+    elif frames is not None:
+        numbers = numbers_of(frames, -len(run), "frames")
+        if max(numbers, default=0) >= len(run):
+            raise InputError(f"frames must be below the number of frames, {len(run)}, but go up to {max(numbers)}.")
+        chosen = chosen[numbers]
     maximum_lag = whole_number(maximum_lag, 0, "maximum_lag")
     if len(chosen) < _FEWEST_BLOCKS * max(1, maximum_lag):
         raise InputError(

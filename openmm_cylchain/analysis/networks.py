@@ -12,7 +12,7 @@ from ..mechanics.geometry import segment_vectors
 from ..units.quantities import ANGLE, LENGTH, non_negative, positive
 from ..units.types import BoolArray, FloatArray, IntArray, Scalar
 from .crossings import pairs_of_points, segment_distances
-from .runs import Run, volume_of
+from .runs import Run, require_run, volume_of
 
 
 def filament_distances(run: Run, frame: int, cutoff: Scalar) -> FloatArray:
@@ -36,6 +36,7 @@ def filament_distances(run: Run, frame: int, cutoff: Scalar) -> FloatArray:
     InputError
         For a cutoff that with the longest segment exceeds the width of the periodic box.
     """
+    require_run(run)
     cutoff = positive(cutoff, LENGTH, "cutoff")
     near = _NearSegments(run, frame, cutoff)
     owners, first, second, distances = near.owners, near.first, near.second, near.distances
@@ -78,6 +79,7 @@ def contact_map(run: Run, frame: int, gap: Scalar = 0.0) -> BoolArray:
     gap : length
         Between surfaces, from which the diameters are taken; 0 for contact.
     """
+    require_run(run)
     gap = non_negative(gap, LENGTH, "gap")
     radii = 0.5 * np.array([own.diameter for own in run.filaments])
     reach = radii[:, None] + radii[None] + gap
@@ -113,6 +115,7 @@ def find_bundles(run: Run, frame: int, gap: Scalar, angle: Scalar, overlap: Scal
     InputError
         For a gap that with diameter and longest segment exceeds the width of the periodic box; bad lengths or angle.
     """
+    require_run(run)
     gap, overlap = non_negative(gap, LENGTH, "gap"), non_negative(overlap, LENGTH, "overlap")
     angle = positive(angle, ANGLE, "angle")
     if angle > 0.5 * math.pi:
@@ -172,6 +175,7 @@ def contraction(run: Run) -> FloatArray:
     InputError
         In a periodic box, whose size does not change.
     """
+    require_run(run)
     if run.box is not None:
         raise InputError("A periodic box does not contract: look at contacts or distances instead.")
     radii = [math.sqrt(float(np.var(np.concatenate(run.curves(frame)), axis=0).sum())) for frame in range(len(run))]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
+from ..units.quantities import LENGTH, in_units_of
 from ..units.types import FloatArray
 
 
@@ -29,7 +30,7 @@ def order_tensor(vectors: FloatArray) -> FloatArray:
     InputError
         For another shape, none, or a total length of zero.
     """
-    vectors = np.asarray(vectors, dtype=float)
+    vectors = np.asarray(in_units_of(vectors, LENGTH, "vectors"))
     if vectors.ndim != 2 or vectors.shape[1] != 3 or not len(vectors):
         raise InputError(f"vectors must have the shape (segments, 3), but have {vectors.shape}.")
     lengths = np.linalg.norm(vectors, axis=1)

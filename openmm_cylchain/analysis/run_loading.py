@@ -7,10 +7,12 @@ import numpy as np
 
 from ..errors import InputError
 from ..output.dcd_frames import DCDFrames
+from ..output.files import as_path
 from ..output.read_tables import read_reports, read_table
 from ..output.record_file import read_records
 from ..output.run_description import read_run_description
 from ..output.run_files import RunFiles
+from ..units.quantities import true_or_false
 from .runs import Run
 
 
@@ -42,7 +44,7 @@ def load(path: str | Path, incomplete: bool = False) -> Run:
     >>> run = load("output_f_actin")  # doctest: +SKIP
     >>> run.mdtraj(slice(100, None))  # doctest: +SKIP
     """
-    files = RunFiles(path)
+    files, incomplete = RunFiles(as_path(path, "path")), true_or_false(incomplete, "incomplete")
     if not files.path.is_dir():
         raise InputError(f"{path} is not a directory: give that of `openmm-cylchain run --output` or of a RunReporter.")
     if not files.description.exists():

@@ -24,7 +24,7 @@ from ..output.record_file import read_records
 from ..output.run_description import DescribedLinkers, RunDescription
 from ..output.run_files import RunFiles
 from ..output.run_tables import MILLISECOND
-from ..units.quantities import VOLUME, positive, thermal_energy, whole_number
+from ..units.quantities import VOLUME, numbers_of, positive, shown, thermal_energy, whole_number
 from ..units.types import FloatArray, Indices, IntArray, Scalar
 from .run_filaments import PIECES_OF_ELEMENT, RunParticles, chain_of, described_filament
 from .run_topology import read_topology
@@ -109,7 +109,7 @@ class Run:
 
     def _frame(self, frame):
         if isinstance(frame, bool) or not isinstance(frame, (int, np.integer)) or not -len(self) <= frame < len(self):
-            raise InputError(f"The run in {self.path} has the frames 0 to {len(self) - 1}, but not {frame!r}.")
+            raise InputError(f"The run in {self.path} has the frames 0 to {len(self) - 1}, but not {shown(frame)}.")
         return int(frame) % len(self)
 
     @cached_property
@@ -237,6 +237,9 @@ class Run:
 
         Crosslinks that are off are left out.
         """
+        names = self.spring_names
+        if whole_number(kind, 0, "kind") >= max(1, len(names)):
+            raise InputError(f"kind must be that of one of the springs {', '.join(names) or '(none)'}, but is {kind}.")
         if kind == len(self.linker_types):
             found = self.crosslinks(frame)
             lines = found.places[found.active]
@@ -286,7 +289,7 @@ class Run:
         if isinstance(frames, slice):
             chosen = np.arange(len(self))[frames]
         else:
-            chosen = np.array([self._frame(frame) for frame in np.atleast_1d(frames)], dtype=int)
+            chosen = np.array([self._frame(frame) for frame in numbers_of(frames, -len(self), "frames")], dtype=int)
         if not len(chosen):
             raise InputError("frames selects no frame.")
         return chosen
@@ -380,7 +383,7 @@ class Run:
         Its nodes where segments are straight; of beam elements, ``per_element`` points of the curve of each, and the
         last node. Those of a ring end before its first point, to which the last one is joined.
         """
-        positions = self.positions(frame)
+        positions, per_element = self.positions(frame), whole_number(per_element, 1, "per_element", 10**6)
         return [
             own.type.segment_kind.curve(positions[nodes], positions[own.control_points], per_element, own.ring)
             for own, nodes in zip(self.filaments, self._nodes_in(frame))
@@ -438,8 +441,15 @@ class Run:
         return [total / len(frames) for total in totals]
 
 
+def require_run(run: Run) -> None:
+    """Raise InputError for what has no filaments in frames."""
+    if not (hasattr(run, "filaments") and hasattr(run, "box")):
+        raise InputError(f"run must be a Run, as analysis.load returns it, but is {shown(run)}.")
+
+
 def volume_of(run: Run, volume: Scalar | None) -> float:
     """A volume in nm^3; that of the periodic box of a run if None, InputError if it has none."""
+    require_run(run)
     if volume is not None:
         return positive(volume, VOLUME, "volume")
     if run.box is None:

@@ -266,7 +266,18 @@ def _fluctuations(series, mean):
         if _is_constant(series, axis=0):
             return np.zeros_like(series)
         return series - series.mean(axis=0)
-    return series - in_units_of(mean, DIMENSIONLESS, "mean")
+    return series - _mean_of(series, mean)
+
+
+def _mean_of(series, mean):
+    mean = in_units_of(mean, DIMENSIONLESS, "mean")
+    try:
+        shape = np.broadcast_shapes(np.shape(mean), series.shape[1:])
+    except ValueError:
+        shape = ()
+    if shape != series.shape[1:]:
+        raise InputError(f"mean must broadcast with one frame, {series.shape[1:]}, but has the shape {np.shape(mean)}.")
+    return mean
 
 
 def _lagged_products(fluctuations):
@@ -430,7 +441,7 @@ def relaxation_time(
     blocks = whole_number(blocks, 2, "blocks")
     step = positive(time_step, TIME, "time_step")
     series = series.reshape(*series.shape[:2], -1)
-    average = series.mean(axis=(0, 1)) if mean is None else in_units_of(mean, DIMENSIONLESS, "mean")
+    average = series.mean(axis=(0, 1)) if mean is None else _mean_of(series, mean)
     copies = _time_blocks(series - average, blocks)
     products = _lagged_products(copies)
     products = products.reshape(products.shape[0], copies.shape[1], copies.shape[2]).sum(axis=2)

@@ -6,11 +6,10 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 from openmm import unit
 
 from ..errors import InputError
-from ..filaments.chain_type import ChainType, check_bending_is_given_once, check_type_name
+from ..filaments.chain_type import ChainType, check_bending_is_given_once, check_type_name, number_of
 from ..filaments.straight_segments import StraightSegments
 from ..mechanics.friction import SegmentFriction
 from ..mechanics.potentials import BOND_DIFFERENCE
@@ -22,8 +21,10 @@ from ..units.quantities import (
     LENGTH,
     MASS,
     TEMPERATURE,
+    VISCOSITY,
     positive,
     thermal_energy,
+    true_or_false,
     whole_number,
 )
 from ..units.types import FloatArray, Scalar
@@ -284,16 +285,16 @@ class BeadSpringType(ChainType):
 
     def segment_lengths(self, segments: int, closed: bool = False) -> FloatArray:
         """Rest lengths (segments,) in nm: a, or d/(1 - nu) of the end bonds of an open chain, d of a single bond."""
-        lengths = np.full(segments, self.bead_spacing)
-        if not closed:
+        lengths = np.full(number_of(segments, "segments"), self.bead_spacing)
+        if not true_or_false(closed, "closed"):
             lengths[[0, -1]] = self.stretching_modulus / self.segment_stiffnesses(segments)[0]
         return lengths
 
     def segment_stiffnesses(self, segments: int, closed: bool = False) -> FloatArray:
         """Stiffnesses (segments,) in kJ/(mol nm^2): lambda (1 - 2 nu), lambda (1 - nu) of the end bonds of an open
         chain, lambda of a single bond."""
-        stiffnesses = np.full(segments, self.segment_stiffness)
-        if not closed:
+        stiffnesses = np.full(number_of(segments, "segments"), self.segment_stiffness)
+        if not true_or_false(closed, "closed"):
             # An end bond has one neighbour, a single bond none.
             stiffnesses[[0, -1]] = self.stiffness - (self.bending_stiffness if segments > 1 else 0.0)
         return stiffnesses
@@ -303,57 +304,50 @@ class BeadSpringType(ChainType):
 
         ``v_n - nu (v_(n-1) + v_(n+1)) = d`` with v_0 = v_(N+1) = 0: they grow from the ends to a.
         """
-        return self.natural_length * straight_lengths(self.nu, segments)
+        return self.natural_length * straight_lengths(self.nu, number_of(segments, "segments"))
 
     def node_masses(self, nodes: int, closed: bool = False) -> FloatArray:
         """Masses (nodes,) in Da: ``bead_mass``."""
-        return np.full(nodes, self.bead_mass)
+        true_or_false(closed, "closed")
+        return np.full(number_of(nodes, "nodes", 2), self.bead_mass)
 
     def segment_friction(self, viscosity: Scalar, temperature: Scalar, segments: int = 1) -> SegmentFriction:
         """Friction of the cylinder of the length a that resists as beads do, half of xi at either end.
 
         gamma_par = gamma_perp = xi, gamma_rot = gamma_def = xi a^2/4. Estimates use it, simulations do not.
         """
+        positive(viscosity, VISCOSITY, "viscosity")
+        thermal_energy(temperature)
+        number_of(segments, "segments")
         turning = 0.25 * self.bead_friction * self.bead_spacing**2
         return SegmentFriction(self.bead_friction, self.bead_friction, turning, turning)
 
-    def stretching_energies(self, lengths: FloatArray, closed: bool = False) -> FloatArray:
-        """See ``ChainType.stretching_energies``; as in the second form of the energy, not in eq. (1)."""
+    def _stretching_energies(self, lengths, closed):
+        """As in the second form of the energy, not in eq. (1)."""
         segments = np.shape(lengths)[-1]
         extension = lengths - self.segment_lengths(segments, closed)
         return 0.5 * self.segment_stiffnesses(segments, closed) * extension**2
 
-    def stretching_derivatives(self, lengths: FloatArray, closed: bool = False) -> FloatArray:
+    def _stretching_derivatives(self, lengths, closed):
         segments = np.shape(lengths)[-1]
         return self.segment_stiffnesses(segments, closed) * (lengths - self.segment_lengths(segments, closed))
 
-    def check_folds(self, vectors: FloatArray, label: str, closed: bool = False) -> None:
+    def _check_folds(self, vectors, label, closed):
         """Nothing: the forces of ``bending_energies`` are defined between any two bonds."""
 
-    def bending_energies(
-        self, vectors: FloatArray, stiffnesses: npt.ArrayLike | None = None, closed: bool = False
-    ) -> FloatArray:
-        """(kappa/2) |u_(n+1) - u_n|^2; see ``ChainType.bending_energies``."""
-        kappa = self.bending_stiffness if stiffnesses is None else np.asarray(stiffnesses)
+    def _bending_energies(self, vectors, stiffnesses, closed):
+        """(kappa/2) |u_(n+1) - u_n|^2."""
+        kappa = self.bending_stiffness if stiffnesses is None else stiffnesses
         return 0.5 * kappa * np.sum(_bond_differences(vectors, closed) ** 2, axis=-1)
 
-    def bending_end_forces(self, vectors: FloatArray, stiffnesses: FloatArray, closed: bool = False) -> FloatArray:
-        pairs = np.asarray(stiffnesses)[:, None] * _bond_differences(vectors, closed)
+    def _bending_end_forces(self, vectors, stiffnesses, closed):
+        pairs = stiffnesses[:, None] * _bond_differences(vectors, closed)
         if closed:
             return np.roll(pairs, -1, axis=0) - pairs
         none = np.zeros((1, 3))
         return np.concatenate([pairs, none]) - np.concatenate([none, pairs])
 
-    def draw_chain(
-        self,
-        segments: int,
-        temperature: Scalar,
-        generator: np.random.Generator,
-        start: npt.ArrayLike = (0.0, 0.0, 0.0),
-        direction: FloatArray | None = None,
-        planar: bool = False,
-        joint_stiffnesses: FloatArray | None = None,
-    ) -> FloatArray:
+    def _draw_chain(self, segments, temperature, generator, start, direction, planar, joint_stiffnesses):
         reduced = self.reduced_temperature(positive(temperature, TEMPERATURE, "temperature"))
         (bonds,) = draw_bonds(self.nu, reduced, segments, generator, 1, planar, direction)
         steps = self.natural_length * np.cumsum(bonds, axis=0)

@@ -9,21 +9,19 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..units.quantities import TEMPERATURE, positive, shown, true_or_false, whole_number
+from ..units.quantities import TEMPERATURE, numbers_of, positive, shown, true_or_false
 from ..units.types import FloatArray, Indices, Scalar
 from .bead_spring_type import BeadSpringType
-from .modes import mode_shapes
+from .modes import mode_shapes, number_of_bonds
 from .transfer_operator import TransferOperator, transfer_operator
 
-_MOST_BONDS = 10**7
+_MOST_BONDS_OF_PAIRS = 10**4
 
 
 def _operator(bead_type, bonds, temperature, planar):
     if not isinstance(bead_type, BeadSpringType):
         raise InputError(f"This is for a BeadSpringType, such as DSDNA_BASE_PAIRS, but not for {shown(bead_type)}.")
-    bonds, planar = whole_number(bonds, 1, "bonds"), true_or_false(planar, "planar")
-    if bonds > _MOST_BONDS:
-        raise InputError(f"bonds must be at most {_MOST_BONDS:.0e}, but is {bonds}.")
+    bonds, planar = number_of_bonds(bonds), true_or_false(planar, "planar")
     reduced = bead_type.reduced_temperature(positive(temperature, TEMPERATURE, "temperature"))
     return transfer_operator(bead_type.nu, reduced, bonds, 2 if planar else 3)
 
@@ -57,6 +55,7 @@ def bead_spring_bond_correlations(
     bead_type: BeadSpringType, bonds: int, temperature: Scalar, planar: bool = False
 ) -> FloatArray:
     """Covariances <u_i.u_j> of all pairs of bonds: (bonds, bonds) in nm^2, in a time that grows as bonds^2."""
+    bonds = number_of_bonds(bonds, _MOST_BONDS_OF_PAIRS)
     operator = _operator(bead_type, bonds, temperature, planar)
     correlations = np.diag(operator.means(np.square)[0])
     for bond in range(operator.bonds - 1):
@@ -90,8 +89,8 @@ def bead_spring_mean_square_distances_from_center(
     """
     operator = _operator(bead_type, bonds, temperature, planar)
     count = operator.bonds + 1
-    chosen = np.arange(count) if beads is None else np.atleast_1d(np.asarray(beads))
-    if np.any((chosen < 0) | (chosen >= count)):
+    chosen = np.arange(count) if beads is None else np.array(numbers_of(beads, 0, "beads"), dtype=int)
+    if np.any(chosen >= count):
         raise InputError(f"beads must be from 0 to {count - 1}, but are {shown(beads)}.")
     bond = np.arange(1, count)[:, None]
     weights = (bond <= chosen).astype(float) - (count - bond) / count
@@ -158,5 +157,6 @@ def bead_spring_persistence_length(bead_type: BeadSpringType, temperature: Scala
     From the largest eigenvalues of the transfer operator. It is shorter than l_p = kappa a^3/(k_B T), eq. (3), by the
     order of a: 112.7 a of ``DSDNA_BASE_PAIRS``, where l_p is 114.4 a.
     """
-    length = bead_type.bead_spacing * _operator(bead_type, 1, temperature, planar).correlation_length()
+    operator = _operator(bead_type, 1, temperature, planar)
+    length = bead_type.bead_spacing * operator.correlation_length()
     return 0.5 * length if planar else length

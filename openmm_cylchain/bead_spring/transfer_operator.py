@@ -272,17 +272,12 @@ def _first_in_space(x, zeroth):
     return np.where(small, np.exp(-x) * series, (0.5 * (1.0 + np.exp(-2.0 * x)) - zeroth) / safe)
 
 
-_ASYMPTOTIC = 1e6
-
-
 def _zeroth_in_plane(x):
-    # scipy gives up at very large x.
-    asymptote = (1.0 + 0.125 / np.maximum(x, 1.0)) / np.sqrt(2.0 * np.pi * x + 1e-300)
-    return np.where(x < _ASYMPTOTIC, scipy.special.ive(0, x), asymptote)
+    return scipy.special.i0e(x)
 
 
 def _first_in_plane(x, zeroth):
-    return np.where(x < _ASYMPTOTIC, scipy.special.ive(1, x), zeroth * (1.0 - 0.5 / np.maximum(x, 1.0)))
+    return scipy.special.i1e(x)
 
 
 _RADIAL = {3: (_zeroth_in_space, _first_in_space), 2: (_zeroth_in_plane, _first_in_plane)}

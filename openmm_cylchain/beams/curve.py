@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from ..mechanics.geometry import unrolled
+from ..mechanics.geometry import cross, unrolled
 from ..mechanics.quadrature import gauss_points
 from ..units.types import FloatArray
 
@@ -60,7 +60,7 @@ def control_points_of(nodes: FloatArray, tangents: FloatArray, length: float) ->
 def natural_tangents(nodes: FloatArray, closed: bool = False) -> FloatArray:
     """Unit vectors (nodes, 3) along the natural cubic spline through nodes (nodes, 3), which bends least.
 
-    Of a ring, along the periodic one.
+    Of a ring, along the periodic one. NaN where it stops and turns back.
     """
     if closed:
         around = unrolled(nodes)
@@ -71,7 +71,8 @@ def natural_tangents(nodes: FloatArray, closed: bool = False) -> FloatArray:
     else:
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(nodes, axis=0), axis=1))])
         slopes = scipy.interpolate.CubicSpline(along, nodes, bc_type="natural")(along, 1)
-    return slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
+    with np.errstate(invalid="ignore"):
+        return slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
 
 
 def _hermite(places, derivative):
@@ -137,7 +138,7 @@ def arc_lengths(nodes: FloatArray, control_points: FloatArray, closed: bool = Fa
 
 def _bend(first, second):
     # The rotation from one direction to another, as vectors along its axis.
-    axis = np.cross(first, second)
+    axis = cross(first, second)
     sine, cosine = np.linalg.norm(axis, axis=-1), np.sum(first * second, axis=-1)
     factor = np.where(sine > 0.0, np.arctan2(sine, cosine) / np.where(sine > 0.0, sine, 1.0), 1.0)
     return axis * factor[..., None]

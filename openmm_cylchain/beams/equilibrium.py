@@ -20,6 +20,7 @@ import numpy.typing as npt
 import scipy
 
 from ..errors import InputError
+from ..mechanics.geometry import cross
 from ..units.types import FloatArray
 from .curve import BeamElement, control_points_of, shortening_of
 
@@ -101,12 +102,12 @@ def _frames(vectors, planar):
     directions = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
     if planar:
         third = np.broadcast_to([0.0, 0.0, 1.0], directions.shape)
-        second = np.cross(third, directions)
+        second = cross(third, directions)
     else:
         away = np.eye(3)[np.argmin(np.abs(directions), axis=1)]
-        second = np.cross(directions, away)
+        second = cross(directions, away)
         second /= np.linalg.norm(second, axis=1, keepdims=True)
-        third = np.cross(directions, second)
+        third = cross(directions, second)
     return np.stack([directions, second, third], axis=1)
 
 

@@ -14,7 +14,15 @@ from ..errors import ContactWarning, InputError
 from ..filaments.chain_type import ChainType
 from ..filaments.collection import FilamentCollection, require_filaments
 from ..filaments.grown import longest_segment
-from ..units.quantities import LENGTH, STIFFNESS, positive, thermal_energy, true_or_false, whole_number
+from ..units.quantities import (
+    LARGEST_INT,
+    LENGTH,
+    STIFFNESS,
+    positive,
+    thermal_energy,
+    true_or_false,
+    whole_number,
+)
 from ..units.types import Indices, Numbers, Scalar
 from .contacts import SAFE_BARRIER, filament_diameters, outside_particles, particle_diameters
 from .periodicity import default_box, is_periodic
@@ -145,7 +153,7 @@ def capsule_contact_force(
         stiffness = default_capsule_stiffness(diameters.min(), filaments.temperature)
     stiffness = positive(stiffness, STIFFNESS, "stiffness")
     if excluded_neighbors is not None:
-        excluded_neighbors = whole_number(excluded_neighbors, 0, "excluded_neighbors")
+        excluded_neighbors = whole_number(excluded_neighbors, 0, "excluded_neighbors", LARGEST_INT)
     periodic = is_periodic(system) if periodic is None else true_or_false(periodic, "periodic")
     if periodic:
         _check_box(system, filaments, max([*diameters, *sphere_diameters]))
@@ -153,13 +161,12 @@ def capsule_contact_force(
     _warn_of_planar_crossing(filaments, default_box(system) if periodic else None)
     force = plugin.CylinderChainContactForce(stiffness)
     force.setUsesPeriodicBoundaryConditions(periodic)
-    for number, (filament, value) in enumerate(zip(filaments, diameters)):
+    for filament, ends, value in zip(filaments, _ends_of_capsules(filaments), diameters):
         neighbors = excluded_neighbors
         if neighbors is None:
-            shortest = _capsule_lengths(filaments, number).min()
+            shortest = _capsule_lengths(filament, ends).min()
             neighbors = max(1, math.ceil(_EXCLUDED_DIAMETERS * value / shortest - 1e-9))
-        ends = [int(end) for end in _ends_of_capsules(filaments, number)]
-        force.addChain(ends, float(value), neighbors, filament.closed)
+        force.addChain([int(end) for end in ends], float(value), neighbors, filament.closed)
     for particle, value in zip(spheres, sphere_diameters):
         force.addSphere(int(particle), float(value))
     return force
@@ -186,32 +193,32 @@ def _require_beads(filaments, diameters):
             )
 
 
-def _ends_of_capsules(filaments, number):
-    kind = filaments[number].type.segment_kind
-    return kind.particles_along(filaments.node_indices[number], filaments.bead_indices[number])
+def _ends_of_capsules(filaments):
+    return [
+        filament.type.segment_kind.particles_along(nodes, beads)
+        for filament, nodes, beads in zip(filaments, filaments.node_indices, filaments.bead_indices)
+    ]
 
 
-def _capsule_lengths(filaments, number):
+def _capsule_lengths(filament, ends):
     # At rest; of a filament that grows, as it is at the start.
-    filament = filaments[number]
     if filament.type.segment_kind.straight:
         return filament.type.segment_lengths(filament.segments, filament.closed)
     lengths = filament.type.segment_lengths(filament.segments, filament.closed)
-    return lengths * (filament.segments / (len(_ends_of_capsules(filaments, number)) - (not filament.closed)))
+    return lengths * (filament.segments / (len(ends) - (not filament.closed)))
 
 
-def _longest_capsule(filaments, number):
-    filament = filaments[number]
+def _longest_capsule(filament, ends):
     if filament.growth is not None:
         return longest_segment(filament)
-    return float(_capsule_lengths(filaments, number).max())
+    return float(_capsule_lengths(filament, ends).max())
 
 
 def _check_box(system, filaments, diameter):
     a, b, c = default_box(system)
     volume = abs(np.dot(a, np.cross(b, c)))
     narrowest = min(volume / np.linalg.norm(np.cross(*pair)) for pair in ((b, c), (c, a), (a, b)))
-    longest = max(_longest_capsule(filaments, number) for number in range(len(filaments)))
+    longest = max(_longest_capsule(*each) for each in zip(filaments, _ends_of_capsules(filaments)))
     needed = 2.0 * (longest + diameter)
     if narrowest < needed:
         raise InputError(

@@ -72,7 +72,7 @@ def find_contacts(force: openmm.Force, context: openmm.Context) -> ContactFrame:
     InputError
         If the force is another one, or none of the Context's.
     """
-    own = as_capsule_contact_force(force)
+    own = as_capsule_contact_force(force) if isinstance(force, openmm.Force) else None
     if own is None:
         raise InputError(f"force must be one of capsule_contact_force, but is {type(force).__name__}.")
     require_kind(context, openmm.Context, "context")

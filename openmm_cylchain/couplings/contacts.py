@@ -24,7 +24,9 @@ from ..units.quantities import (
     non_negative,
     positive,
     require_kind,
+    shown,
     thermal_energy,
+    true_or_false,
     whole_numbers,
 )
 from ..units.types import FloatArray, Indices, IntArray, Numbers, Scalar
@@ -129,11 +131,15 @@ def add_exclusions(force: openmm.Force, pairs: npt.ArrayLike) -> None:
     """
     if not isinstance(force, _WITH_EXCLUSIONS):
         raise InputError(
-            f"force must be one of {', '.join(one.__name__ for one in _WITH_EXCLUSIONS)}, but is {force!r}."
+            f"force must be one of {', '.join(one.__name__ for one in _WITH_EXCLUSIONS)}, but is {shown(force)}."
         )
-    pairs = np.asarray(pairs)
-    if pairs.size == 0:
+    try:
+        array = np.asarray(pairs)
+    except ValueError:
+        array = np.asarray(None)
+    if array.size == 0 and array.dtype.kind in "iuf":
         return
+    pairs = array
     if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu":
         raise InputError(f"pairs must be an int array (pairs, 2), but has the shape {pairs.shape} of {pairs.dtype}.")
     there = _exclusions(force)
@@ -272,13 +278,14 @@ def contact_force(
     """
     require_filaments(filaments)
     require_kind(system, openmm.System, "system")
+    periodic = is_periodic(system) if periodic is None else true_or_false(periodic, "periodic")
     beads = filaments.bead_indices
     if not any(len(one) for one in beads):
         raise InputError("There are no beads to touch: call add_beads before the filaments are put into a System.")
+    spheres = outside_particles(filaments, system, particles)
     diameters = np.zeros(system.getNumParticles())
     for indices, value in zip(beads, filament_diameters(diameter, len(filaments))):
         diameters[indices] = value
-    spheres = outside_particles(filaments, system, particles)
     diameters[spheres] = particle_diameters(particles, particle_diameter)
     if stiffness is None:
         if filaments.temperature == 0.0:
@@ -294,7 +301,7 @@ def contact_force(
     force.addPerParticleParameter("diameter")
     for value in diameters:
         force.addParticle([value])
-    _set_cutoff(force, system, float(diameters.max()), is_periodic(system) if periodic is None else bool(periodic))
+    _set_cutoff(force, system, float(diameters.max()), periodic)
     add_exclusions(force, excluded_pairs(filaments, 2.0 * diameters[np.concatenate(beads)].max()))
     return force
 
@@ -356,6 +363,8 @@ def outside_particles(filaments: FilamentCollection, system: openmm.System, part
     count = system.getNumParticles()
     filled = [*filaments.node_indices, *filaments.control_point_indices, filaments.attachment_indices]
     own = set(np.concatenate(filled).tolist())
+    if max(own) >= count:
+        raise InputError("system is not the System that the filaments were put into: it has too few particles.")
     indices = whole_numbers(particles, 0, "particles")
     for index in indices:
         if index >= count:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import threading
+import zipfile
 from collections import OrderedDict
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -16,7 +17,19 @@ import openmm
 
 from ..errors import InputError
 from ..mechanics.geometry import to_nearest_images
-from ..units.quantities import whole_number
+from ..output.files import as_path, check_output_path
+from ..units.quantities import (
+    LENGTH,
+    STIFFNESS,
+    in_units_of,
+    non_negative,
+    numbers_to_compute_with,
+    positive,
+    require_kind,
+    shown,
+    true_or_false,
+    whole_number,
+)
 from ..units.types import BoolArray, FloatArray, IntArray
 from .beam_curves import BeamCurves
 from .link_places import PLACE_COLUMNS, LinkPlaces
@@ -83,9 +96,11 @@ class CrosslinkTable:
             self._set(name, getattr(places, name))
         # They share their arrays.
         object.__setattr__(self, "_places", places)
-        active = np.array(self.active, dtype=object)
-        if not active.ndim or not all(isinstance(one, (bool, np.bool_)) for one in active.ravel()):
-            raise InputError("active of a table of crosslinks must be an array of True and False.")
+        active = self.active
+        if not (isinstance(active, np.ndarray) and active.dtype == bool and active.ndim):
+            active = np.array(active, dtype=object)
+            if not active.ndim or not all(isinstance(one, (bool, np.bool_)) for one in active.ravel()):
+                raise InputError("active of a table of crosslinks must be an array of True and False.")
         active = active.astype(bool)
         self._set("active", active if len(active) else np.ones(len(self.numbers), dtype=bool))
         self._check()
@@ -160,6 +175,11 @@ class CrosslinkTable:
         self, places: LinkPlaces, stiffness: float, rest_length: float, maximum_extension: float
     ) -> CrosslinkTable:
         """This table with further crosslinks of equal parameters, numbered on."""
+        require_kind(places, LinkPlaces, "places")
+        stiffness = positive(stiffness, STIFFNESS, "stiffness")
+        rest_length = non_negative(rest_length, LENGTH, "rest_length")
+        if not (isinstance(maximum_extension, float) and maximum_extension == np.inf):
+            maximum_extension = positive(maximum_extension, LENGTH, "maximum_extension")
         count = len(places)
         both = self.places.with_places(places)
         return CrosslinkTable(
@@ -183,10 +203,11 @@ class CrosslinkTable:
     def switched(self, numbers: IntArray, active: bool) -> CrosslinkTable:
         """This table with some crosslinks on or off; raises InputError as ``without`` does."""
         switched = np.array(self.active)
-        switched[self._rows_of(numbers, "switched")] = active
+        switched[self._rows_of(numbers, "switched")] = true_or_false(active, "active")
         return replace(self, active=switched)
 
     def _rows_of(self, numbers, what):
+        numbers = as_numbers(numbers)
         rows = np.searchsorted(self.numbers, numbers)
         known = rows < len(self)
         known[known] = self.numbers[rows[known]] == numbers[known]
@@ -198,17 +219,31 @@ class CrosslinkTable:
 
     def save(self, file: str | Path | IO[bytes]) -> None:
         """Write the table to a file (.npz), for ``CrosslinkTable.load`` in another process."""
+        if not hasattr(file, "write"):
+            check_output_path(file)
         np.savez(file, **self.__getstate__())
 
     @classmethod
     def load(cls, file: str | Path | IO[bytes]) -> CrosslinkTable:
-        """Read a table that ``save`` has written."""
-        with np.load(file) as content:
+        """Read a table that ``save`` has written; InputError for a file that holds none."""
+        if not hasattr(file, "read"):
+            file = as_path(file, "file")
+        try:
+            content = np.load(file)
+        except FileNotFoundError:
+            raise InputError(f"file {file} does not exist.") from None
+        except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
+            raise InputError(
+                f"file {file} holds no table of crosslinks that CrosslinkTable.save wrote: {error}"
+            ) from None
+        if not isinstance(content, np.lib.npyio.NpzFile):
+            raise InputError(f"file {file} holds an array alone, and no table of crosslinks.")
+        with content:
             missing = {*_COLUMNS, "next_number"} - set(content.files)
             if missing:
                 raise InputError(f"{file} holds no table of crosslinks: it lacks {', '.join(sorted(missing))}.")
             columns = {name: content[name] for name in (*_COLUMNS, *_FURTHER) if name in content.files}
-            return cls(**columns, next_number=int(content["next_number"]))
+            return cls(**columns, next_number=content["next_number"].item())
 
     def displacements(
         self,
@@ -230,9 +265,36 @@ class CrosslinkTable:
         curves : BeamCurves, optional
             Those of beam elements, on which places between their nodes are.
         """
+        positions = numbers_to_compute_with(positions, LENGTH, "positions", 3)
+        last = max(self.pairs.max(initial=-1), self.partners.max(initial=-1))
+        if positions.ndim != 2 or len(positions) <= last:
+            raise InputError(
+                f"positions must have the shape (particles, 3) and hold particle {last}, but have {positions.shape}."
+            )
+        box = None if box is None else _as_box(box, "box")
+        segment_box = None if segment_box is None else _as_box(segment_box, "segment_box")
+        if curves is not None:
+            require_kind(curves, BeamCurves, "curves")
         second, first = (self.places.positions(positions, side, segment_box, curves) for side in (1, 0))
         vectors = second - first
         return vectors if box is None else to_nearest_images(vectors, box)
+
+
+def _as_box(vectors, name):
+    box = np.asarray(in_units_of(vectors, LENGTH, name))
+    if box.shape != (3, 3) or not np.all(np.diagonal(box) > 0.0):
+        raise InputError(f"{name} must be three vectors in the reduced form of OpenMM, but is {shown(vectors)}.")
+    return box
+
+
+def as_numbers(numbers: Any) -> IntArray:
+    """The numbers of crosslinks, of which there may be one alone; InputError for what is none."""
+    array = np.atleast_1d(numbers if isinstance(numbers, np.ndarray) else np.asarray(numbers, dtype=object)).ravel()
+    if array.dtype.kind not in "iu" or np.any(array < 0):
+        array = np.array([whole_number(number, 0, "The number of a crosslink") for number in array], dtype=np.int64)
+    if np.any(array >= 2**31):
+        raise InputError(f"There is no crosslink {array.max()}: numbers are below 2^31.")
+    return array.astype(np.int64)
 
 
 class _TableRegistry:

@@ -28,19 +28,21 @@ from ..units.quantities import (
     LENGTH,
     STIFFNESS,
     non_negative,
+    one_of,
     positive,
     require_kind,
+    shown,
     thermal_energy,
     true_or_false,
     whole_number,
 )
 from ..units.types import FloatArray, FloatOrArray, Indices, IntArray, Scalar, Vector
 from .crosslink_computation import lengths_and_vectors, slopes_of, thermal_stiffness_of
-from .crosslink_tables import CrosslinkTable
+from .crosslink_tables import CrosslinkTable, as_numbers
 from .growing_chains import refuse_links_of_growing
 from .link_places import as_places
 from .link_store import LinkStore
-from .native_links import NativeLinks, is_link_force, is_of_compiled_engine
+from .native_links import NativeLinks, is_of_compiled_engine
 from .periodicity import check_rest_lengths, default_box, is_periodic
 from .portable_links import PortableLinks
 
@@ -106,8 +108,7 @@ class Crosslinks:
     def __init__(
         self, stiffness: Scalar, rest_length: Scalar, model: str = "harmonic", maximum_extension: Scalar | None = None
     ) -> None:
-        if not isinstance(model, str) or model not in STRETCHING_POTENTIALS:
-            raise InputError(f"model must be one of {', '.join(STRETCHING_POTENTIALS)}, but is {model!r}.")
+        one_of(model, STRETCHING_POTENTIALS, "model")
         if (model == "fene") != (maximum_extension is not None):
             raise InputError("maximum_extension must be given for model 'fene', and only for it.")
         self._model = model
@@ -124,11 +125,10 @@ class Crosslinks:
         list of Crosslinks
             In the order in which they were added.
         """
+        require_kind(system, openmm.System, "system")
         found: list[Crosslinks] = []
-        native = 0
         for force in system.getForces():
-            store = PortableLinks.of_force(force) or NativeLinks.of_force(force, native)
-            native += is_link_force(force)
+            store = PortableLinks.of_force(force) or NativeLinks.of_force(force)
             if store is not None:
                 found.append(cls._of(store))
         return found
@@ -136,6 +136,7 @@ class Crosslinks:
     @classmethod
     def of_force(cls, force: openmm.Force) -> Crosslinks | None:
         """The Crosslinks of a force of a System, or None if it is no force of crosslinks of one potential."""
+        require_kind(force, openmm.Force, "force")
         store = PortableLinks.of_force(force) or NativeLinks.of_force(force)
         return None if store is None else cls._of(store)
 
@@ -289,7 +290,7 @@ class Crosslinks:
         InputError
             For a number that is not that of a crosslink of this Context.
         """
-        chosen, store = _as_numbers(numbers), self._store_for(context)
+        chosen, store = as_numbers(numbers), self._store_for(context)
         if store is None:
             self._initial = self._initial.without(chosen)
         else:
@@ -312,7 +313,7 @@ class Crosslinks:
         InputError
             For a number that is not that of a crosslink of this Context.
         """
-        chosen, store = _as_numbers(numbers), self._store_for(context)
+        chosen, store = as_numbers(numbers), self._store_for(context)
         active = true_or_false(active, "active")
         if store is None:
             self._initial = self._initial.switched(chosen, active)
@@ -345,6 +346,7 @@ class Crosslinks:
         InputError
             For particles that do not exist, or a crosslink of a place to itself.
         """
+        self._store_for(context)
         places = as_places(pairs)
         places.check(np.arange(len(places)), None if context is None else context.getSystem().getNumParticles())
         self._replace(context, CrosslinkTable().with_links(places, *self._defaults))
@@ -364,7 +366,8 @@ class Crosslinks:
     def set_table(self, context: openmm.Context | None, table: CrosslinkTable) -> None:
         """Give a Context the crosslinks of a table, with the numbers and parameters that it holds."""
         if not isinstance(table, CrosslinkTable):
-            raise InputError(f"table must be a CrosslinkTable, as Crosslinks.table returns it, but is {table!r}.")
+            raise InputError(f"table must be a CrosslinkTable, as Crosslinks.table returns it, but is {shown(table)}.")
+        self._store_for(context)
         if len(table) and np.all(np.isfinite(table.maximum_extension)) != (self._model == "fene"):
             raise InputError(f"The table is not one of crosslinks with model {self._model!r}.")
         table.places.check(table.numbers, None if context is None else context.getSystem().getNumParticles())
@@ -443,6 +446,7 @@ class Crosslinks:
         """
         stiffness, extension = self._defaults[0], self._defaults[2]
         if table is not None:
+            require_kind(table, CrosslinkTable, "table")
             stiffness, extension = table.stiffness, table.maximum_extension
         return thermal_stiffness_of(self._model, stiffness, extension, thermal_energy(temperature))
 
@@ -454,7 +458,7 @@ class Crosslinks:
         if self._store is None:
             raise InputError("These crosslinks are not in a System yet: call add_to before Contexts are created.")
         if not isinstance(context, openmm.Context):
-            raise InputError(f"context must be an openmm.Context, but is {context!r}.")
+            raise InputError(f"context must be an openmm.Context, but is {shown(context)}.")
         self._store.require(context)
         return self._store
 
@@ -492,12 +496,3 @@ def _check_in_context(store, context, numbers, rest_lengths):
         box, _ = store.boxes(context, context.getState())
         if box is not None:
             check_rest_lengths(numbers, rest_lengths, box)
-
-
-def _as_numbers(numbers):
-    array = np.atleast_1d(numbers if isinstance(numbers, np.ndarray) else np.asarray(numbers, dtype=object)).ravel()
-    if array.dtype.kind not in "iu" or np.any(array < 0):
-        array = np.array([whole_number(number, 0, "The number of a crosslink") for number in array], dtype=np.int64)
-    if np.any(array >= 2**31):
-        raise InputError(f"There is no crosslink {array.max()}: numbers are below 2^31.")
-    return array.astype(np.int64)

@@ -1,5 +1,6 @@
 """The places that crosslinks join: particles, places on segments and fixed points, as columns of numbers."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -183,7 +184,7 @@ class LinkPlaces:
 def as_places(pairs: Any) -> LinkPlaces:
     """What a user gives as (n, 2) places: particles, SegmentPlaces, and one fixed point at most in each pair; else
     InputError."""
-    particles = _as_particles(pairs)
+    particles = None if isinstance(pairs, (str, bytes, Mapping)) else _as_particles(pairs)
     if particles is not None:
         return LinkPlaces(particles)
     rows = _as_rows(pairs)
@@ -217,6 +218,8 @@ def _as_particles(pairs):
 
 
 def _as_rows(pairs):
+    if isinstance(pairs, (str, bytes, Mapping)):
+        return None
     try:
         rows = [tuple(pair) for pair in pairs]
     except TypeError:

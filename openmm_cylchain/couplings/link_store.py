@@ -76,7 +76,10 @@ def unknown_crosslinks(changes: int) -> InputError:
 
 def not_of_this_system() -> InputError:
     """The error of a Context without these crosslinks."""
-    return InputError("This Context is of a System that does not have these crosslinks.")
+    return InputError(
+        "This Context is of a System that does not have these crosslinks. Those of another System, and of a copy, are "
+        "Crosslinks.from_system(system)."
+    )
 
 
 def parameters_of(force: openmm.Force, beginning: str) -> list[Any]:

@@ -10,6 +10,7 @@ import numpy as np
 import openmm
 from openmm import unit
 
+from ..errors import InputError
 from ..filaments.collection import FilamentCollection, require_filaments
 from ..units.quantities import require_kind
 from ..units.types import IntArray
@@ -85,6 +86,7 @@ class ContactForces:
     def loads_of_filaments(self, filaments: FilamentCollection) -> Any:
         """The sum of the sizes of all forces on each filament: an array (filaments,) with units."""
         require_filaments(filaments)
+        _refuse_others(self.forces, filaments)
         loads = np.zeros(max(len(filaments), int(self.pairs.max(initial=-1)) + 1))
         np.add.at(loads, self.pairs[:, 0], self.loads._value)
         other = self.pairs[:, 0] != self.pairs[:, 1]
@@ -230,8 +232,15 @@ def _taken(force, context, reader):
     )
 
 
+def _refuse_others(forces, filaments):
+    own = [*filaments.node_indices, *filaments.control_point_indices, filaments.attachment_indices]
+    if max(one.max(initial=-1) for one in own) >= len(forces):
+        raise InputError(f"filaments must be those in the System of the forces, which has {len(forces)} particles.")
+
+
 def _on_filaments(forces, filaments):
     require_filaments(filaments)
+    _refuse_others(forces, filaments)
     values = forces._value
     sums = np.zeros((len(filaments), 3))
     for number, particles in enumerate(zip(filaments.node_indices, filaments.control_point_indices)):

@@ -35,10 +35,7 @@ def table_of_force(force: Any) -> CrosslinkTable:
 
 
 class NativeLinks(LinkStore):
-    """The crosslinks of a CylinderChainLinkForce of a System: see ``LinkStore``.
-
-    ``order`` says how many such forces the System has before this one. Without it, the force is known by its address.
-    """
+    """The crosslinks of a CylinderChainLinkForce of a System, by whose address it is known: see ``LinkStore``."""
 
     def __init__(
         self,
@@ -46,18 +43,16 @@ class NativeLinks(LinkStore):
         model: str,
         defaults: tuple[float, float, float],
         initial: CrosslinkTable,
-        order: int | None = None,
     ) -> None:
         self.model = model
         self.defaults = defaults
         self.initial = initial
-        self._order = order
         self._curves: tuple[BeamCurves | None] | None = None
         self._address = int(force.this)
         self._known: WeakKeyDictionary[openmm.Context, tuple[float, CrosslinkTable]] = WeakKeyDictionary()
 
     @classmethod
-    def of_force(cls, force: openmm.Force, order: int | None = None) -> "NativeLinks | None":
+    def of_force(cls, force: openmm.Force) -> "NativeLinks | None":
         """Those of a force of a System; None if it is no such force, joins tangents, or has several potentials."""
         if not is_link_force(force):
             return None
@@ -74,7 +69,7 @@ class NativeLinks(LinkStore):
         if any(one != number for one in links[4]) or not all(stiffness > 0.0 for stiffness in links[5][1::3]):
             return None
         defaults = (stiffness, rest, extension if models[number] == "fene" else np.inf)
-        return cls(own, models[number], defaults, _as_table(links), order)
+        return cls(own, models[number], defaults, _as_table(links))
 
     @classmethod
     def make_for(
@@ -94,8 +89,7 @@ class NativeLinks(LinkStore):
         force.setUsesPeriodicBoundaryConditions(periodic)
         with _as_input_error():
             force.setLinks(*_as_columns(initial, number))
-        order = sum(kind.isinstance(other) for other in system.getForces())
-        return cls(force, model, defaults, initial, order), force
+        return cls(force, model, defaults, initial), force
 
     def require(self, context: openmm.Context) -> None:
         """See LinkStore."""
@@ -176,15 +170,10 @@ class NativeLinks(LinkStore):
     def _force_in(self, context):
         kind = load_plugin().CylinderChainLinkForce
         # The System keeps what they are, so none of them is kept here.
-        forces = [force for force in context.getSystem().getForces() if kind.isinstance(force)]
-        if self._order is None:
-            addresses = [int(force.this) for force in forces]
-            if self._address not in addresses:
-                raise not_of_this_system()
-            self._order = addresses.index(self._address)
-        if self._order >= len(forces):
-            raise not_of_this_system()
-        return kind.cast(forces[self._order])
+        for force in context.getSystem().getForces():
+            if int(force.this) == self._address:
+                return kind.cast(force)
+        raise not_of_this_system()
 
 
 class _as_input_error:  # noqa: N801 - it reads as a statement

@@ -21,7 +21,8 @@ _PARAMETER = "crosslink_table"
 class PortableLinks(LinkStore):
     """The crosslinks of a PythonForce, by its computation."""
 
-    def __init__(self, computation: CrosslinkComputation) -> None:
+    def __init__(self, computation: CrosslinkComputation, force: openmm.Force) -> None:
+        self._address = int(force.this)
         self._computation = computation
         self.model = computation.model
         self.defaults = computation.defaults
@@ -33,7 +34,7 @@ class PortableLinks(LinkStore):
         if not parameters_of(force, _PARAMETER):
             return None
         content = ElementTree.fromstring(openmm.XmlSerializer.serialize(force)).attrib["function"]
-        return cls(pickle.loads(bytes.fromhex(content)))
+        return cls(pickle.loads(bytes.fromhex(content)), force)
 
     @classmethod
     def make_for(
@@ -56,11 +57,11 @@ class PortableLinks(LinkStore):
         computation = CrosslinkComputation(parameter, model, initial, periodic, defaults)
         force = openmm.PythonForce(computation, {parameter: float(initial.identity)})
         force.setUsesPeriodicBoundaryConditions(periodic)
-        return cls(computation), force
+        return cls(computation, force), force
 
     def require(self, context: openmm.Context) -> None:
         """See LinkStore."""
-        if self._computation.parameter not in dict(context.getParameters()):
+        if all(int(force.this) != self._address for force in context.getSystem().getForces()):
             raise not_of_this_system()
 
     def table(self, context: openmm.Context) -> CrosslinkTable:

@@ -48,10 +48,7 @@ class Shape(ABC):
 
         InputError for positions that are none.
         """
-        points = np.asarray(in_units_of(positions, LENGTH, "positions"))
-        if not points.ndim or points.shape[-1] != 3:
-            raise InputError(f"positions must have the shape (..., 3), but have the shape {points.shape}.")
-        return self._square_depth(points)
+        return self._square_depth(_as_points(positions))
 
     @abstractmethod
     def _square_depth(self, positions: FloatArray) -> FloatOrArray:
@@ -70,13 +67,27 @@ class Face(Shape):
     def faces(self) -> tuple[Face, ...]:
         return (self,)
 
+    def depths(self, positions: Vectors) -> tuple[FloatArray, FloatArray]:
+        """Depths beyond the face in nm, negative inside, and their gradients, for positions (..., 3).
+
+        InputError for positions that are none.
+        """
+        return self._depths(_as_points(positions))
+
     @abstractmethod
-    def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Depths beyond the face in nm, negative inside, and their gradients, for positions (..., 3)."""
+    def _depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The same, for an array in nm."""
 
     def _square_depth(self, positions: FloatArray) -> FloatOrArray:
-        depths, _ = self.depths(positions)
+        depths, _ = self._depths(positions)
         return np.maximum(0.0, depths) ** 2
+
+
+def _as_points(positions):
+    points = np.asarray(in_units_of(positions, LENGTH, "positions"))
+    if not points.ndim or points.shape[-1] != 3:
+        raise InputError(f"positions must have the shape (..., 3), but have the shape {points.shape}.")
+    return points
 
 
 def _radial(vectors, radius):
@@ -135,7 +146,7 @@ class Plane(Face):
     def room(self) -> float:
         return math.inf
 
-    def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         depths = -((positions - self.point) @ self.normal)
         return depths, np.broadcast_to(-self.normal, positions.shape)
 
@@ -221,7 +232,7 @@ class Sphere(Face):
     def room(self) -> float:
         return self.radius
 
-    def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         return _radial(positions - self.center, self.radius)
 
 
@@ -269,7 +280,7 @@ class Cylinder(Face):
     def room(self) -> float:
         return self.radius
 
-    def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         relative = positions - self.point
         return _radial(relative - (relative @ self.axis)[..., None] * self.axis, self.radius)
 
@@ -369,7 +380,7 @@ class Ellipsoid(Face):
     def room(self) -> float:
         return float(np.min(self.semi_axes))
 
-    def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         relative, squares = positions - self.center, self.semi_axes**2
         s = np.sqrt(np.sum(relative**2 / squares, axis=-1))
         steepness = np.maximum(np.sum(relative**2 / squares**2, axis=-1), self._least_steepness)

@@ -6,6 +6,7 @@ import openmm
 
 from ..engine_choice import available_engines
 from ..errors import InputError
+from ..units.quantities import one_of
 
 GPU_PLATFORMS = ("OpenCL", "CUDA", "HIP")
 """OpenMM's platforms for GPUs."""
@@ -41,6 +42,7 @@ def enable_platform(name: str) -> None:
     Traceback (most recent call last):
     openmm_cylchain.errors.InputError: platform must be one of OpenCL, CUDA, HIP, but is 'Vulkan'.
     """
+    one_of(name, GPU_PLATFORMS, "platform")
     if name in _enabled:
         return
     reason = why_not_on(name)
@@ -55,8 +57,7 @@ def enable_platform(name: str) -> None:
 
 def why_not_on(name: str) -> str | None:
     """Why filaments cannot be computed on a platform for GPUs with this installation, or None if they can."""
-    if name not in GPU_PLATFORMS:
-        raise InputError(f"platform must be one of {', '.join(GPU_PLATFORMS)}, but is {name!r}.")
+    one_of(name, GPU_PLATFORMS, "platform")
     missing = available_engines()["compiled"]
     if missing is not None:
         return f"the compiled engine is missing: {missing.rstrip('.')}"

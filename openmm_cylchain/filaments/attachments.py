@@ -7,7 +7,6 @@ Pesek et al., Soft Matter 2016, 12, 3360). On a beam element, it is the point of
 its two nodes and their control points with the weights of the curve.
 """
 
-import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,10 +14,11 @@ from itertools import combinations
 
 import numpy as np
 import openmm
+from numpy.typing import ArrayLike
 
 from ..beams.curve import particle_weights, place_weights
 from ..errors import InputError
-from ..units.quantities import DIMENSIONLESS, LENGTH, in_units_of, non_negative, whole_number
+from ..units.quantities import DIMENSIONLESS, LENGTH, in_units_of, non_negative, require_kind, whole_number
 from ..units.types import FloatArray, Indices, IntArray, Scalar
 from .chain_type import ChainType
 from .filament import Filament
@@ -28,6 +28,8 @@ ATTACHMENT_NAME = "ATT"
 
 BEAD_NAME = "BED"
 """Atom name of beads in topologies."""
+
+_MOST_BEADS = 10**6
 
 SAME_PLACE = 1e-9
 """Places that are closer than this along a contour, in segments, are one."""
@@ -50,6 +52,12 @@ class Attachment:
     segment: int
     fraction: float
     name: str = ATTACHMENT_NAME
+
+    def __post_init__(self) -> None:
+        for name in ("filament", "segment"):
+            object.__setattr__(self, name, whole_number(getattr(self, name), 0, f"Attachment: {name}"))
+        object.__setattr__(self, "fraction", _fraction(self.fraction, "Attachment"))
+        require_kind(self.name, str, "Attachment: name")
 
 
 def locate(
@@ -87,11 +95,18 @@ def locate(
     if fraction is not None:
         raise InputError(f"{label}: a fraction goes with a segment, not with an arc_length.")
     arc_length = non_negative(arc_length, LENGTH, f"{label}: arc_length")
-    place, contour = _along(filament, arc_length)
-    if place > filament.segments * (1.0 + 1e-12):
+    place, contour = _along(filament, np.array([arc_length]))
+    if place[0] > filament.segments * (1.0 + 1e-12):
         raise InputError(f"{label}: arc_length is {arc_length:g} nm, but the filament is {contour:g} nm long.")
-    segment = min(math.floor(place), filament.segments - 1)
-    return Attachment(number, segment, min(place - segment, 1.0))
+    (segment,), (fraction,) = places_along(filament, [arc_length])
+    return Attachment(number, int(segment), float(fraction))
+
+
+def places_along(filament: Filament, arc_lengths: ArrayLike) -> tuple[IntArray, FloatArray]:
+    """Segments, and fractions of them, at arc lengths (n,) in nm from the first node, up to that of the filament."""
+    places, _ = _along(filament, np.asarray(arc_lengths))
+    segments = np.minimum(np.floor(places).astype(int), filament.segments - 1)
+    return segments, np.minimum(places - segments, 1.0)
 
 
 def lengths_along(filament_type: ChainType, segments: int, closed: bool) -> FloatArray:
@@ -99,16 +114,15 @@ def lengths_along(filament_type: ChainType, segments: int, closed: bool) -> Floa
     return filament_type.segment_lengths(segments, True) if closed else filament_type.straight_lengths(segments)
 
 
-def _along(filament, arc_length):
-    # An arc length in segments, and that of the whole filament, at rest.
+def _along(filament, arc_lengths):
+    # Arc lengths in segments, and that of the whole filament, at rest.
     kind, segments = filament.type, filament.segments
     lengths = lengths_along(kind, segments, filament.closed)
     if np.all(lengths == kind.segment_length):
-        return arc_length / kind.segment_length, segments * kind.segment_length
+        return arc_lengths / kind.segment_length, segments * kind.segment_length
     ends = np.concatenate([[0.0], np.cumsum(lengths)])
-    if arc_length > ends[-1]:
-        return segments * arc_length / ends[-1], ends[-1]
-    return float(np.interp(arc_length, ends, np.arange(segments + 1))), ends[-1]
+    inside = np.interp(arc_lengths, ends, np.arange(segments + 1))
+    return np.where(arc_lengths > ends[-1], segments * arc_lengths / ends[-1], inside), ends[-1]
 
 
 def _segment(segment, filament, label):
@@ -119,7 +133,8 @@ def _segment(segment, filament, label):
 
 
 def _fraction(fraction, label):
-    fraction = 0.5 if fraction is None else in_units_of(fraction, DIMENSIONLESS, f"{label}: fraction")
+    if not isinstance(fraction, float) or not 0.0 <= fraction <= 1.0:
+        fraction = 0.5 if fraction is None else in_units_of(fraction, DIMENSIONLESS, f"{label}: fraction")
     if not isinstance(fraction, float) or not 0.0 <= fraction <= 1.0:
         raise InputError(f"{label}: fraction must be a number between 0 and 1, but is {fraction}.")
     return fraction
@@ -162,21 +177,20 @@ def neighbors(attachments: Sequence[Attachment], particles: Indices, nodes: Indi
 
 
 def attachment_positions(
-    attachments: Sequence[Attachment], positions: FloatArray, control_points: FloatArray | None = None
+    segments: IntArray, fractions: FloatArray, positions: FloatArray, control_points: FloatArray | None = None
 ) -> FloatArray:
-    """Where attachment points are on a filament with node positions (n, 3): an array (attachments, 3).
+    """Where places on segments (places,) of a filament with node positions (n, 3) are: an array (places, 3).
 
     Of beam elements, the control points (n, 3) are needed, too.
     """
-    segments = np.array([one.segment for one in attachments], dtype=int)
-    fractions = np.array([one.fraction for one in attachments], dtype=float)[:, None]
     if control_points is not None:
-        weights = place_weights(fractions[:, 0])
+        weights = place_weights(fractions)
         vectors = control_points - positions
         following = (segments + 1) % len(positions)
         columns = (positions[segments], vectors[segments], positions[following], vectors[following])
         return np.einsum("pw,wpx->px", weights, np.array(columns))
-    return (1.0 - fractions) * positions[segments] + fractions * positions[(segments + 1) % len(positions)]
+    shares = fractions[:, None]
+    return (1.0 - shares) * positions[segments] + shares * positions[(segments + 1) % len(positions)]
 
 
 def distribute_beads(filament: Filament, number: int, spacing: float) -> list[Attachment]:
@@ -188,6 +202,11 @@ def distribute_beads(filament: Filament, number: int, spacing: float) -> list[At
     """
     kind = filament.type.segment_kind
     intervals = kind.intervals(filament.segments, filament.type.segment_length, spacing)
+    if intervals > _MOST_BEADS:
+        raise InputError(
+            f"Beads of filament {number}: spacing is {spacing:g} nm, which makes {intervals:.3g} beads, and at most "
+            f"{_MOST_BEADS:.0e} are possible: take half of the contact diameter."
+        )
     # In a ring, the last place would be the first once more.
     count = intervals if filament.closed else intervals + 1
     places = filament.segments * np.arange(count) / intervals

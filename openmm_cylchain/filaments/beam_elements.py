@@ -18,11 +18,11 @@ from ..beams.equilibrium import LONGEST_ELEMENT, calibrated_rigidity, draw_beam
 from ..beams.rings import circle
 from ..errors import InputError
 from ..mechanics.friction import EndCorrections, translational_frictions
-from ..mechanics.geometry import joint_cosines
-from ..units.quantities import DIMENSIONLESS, LENGTH, in_units_of, thermal_energy
+from ..mechanics.geometry import joint_cosines, segment_vectors
+from ..units.quantities import DIMENSIONLESS, LENGTH, in_units_of, thermal_energy, true_or_false
 from ..units.types import FloatArray, Indices, IntArray, Scalar, Vectors
 from .chain_type import Chain, ChainType, Points, SegmentKind
-from .placement import named_nodes
+from .placement import named_nodes, refuse_coinciding
 
 
 class BeamElements(SegmentKind):
@@ -63,6 +63,7 @@ class BeamElements(SegmentKind):
 
     def element(self, filament_type: ChainType, temperature: Scalar, planar: bool) -> BeamElement:
         """With a rigidity EI of which tangents decorrelate over the persistence length."""
+        planar = true_or_false(planar, "planar")
         rigidity, length = filament_type.bending_rigidity, filament_type.segment_length
         if filament_type.temperature is not None:
             rigidity *= calibrated_rigidity(_bend(filament_type, rigidity, filament_type.temperature))
@@ -93,10 +94,18 @@ class BeamElements(SegmentKind):
         if control_points is not None:
             return _given(nodes, control_points, label)
         if tangents is None:
-            return control_points_of(nodes, natural_tangents(nodes, closed), filament_type.segment_length)
+            apart = np.linalg.norm(segment_vectors(nodes, closed), axis=1)
+            refuse_coinciding(apart, len(nodes), label)
+            tangents = natural_tangents(nodes, closed)
+            turning = ~np.isfinite(tangents).all(axis=1)
+            if np.any(turning):
+                raise InputError(f"{label}: its nodes turn back at node {int(np.argmax(turning))}: give its tangents.")
+            return control_points_of(nodes, tangents, filament_type.segment_length)
         tangents = np.asarray(in_units_of(tangents, DIMENSIONLESS, f"{label}: tangents"))
         if tangents.shape != nodes.shape:
             raise InputError(f"{label}: tangents must have the shape {nodes.shape}, but have {tangents.shape}.")
+        # Squares of small components would be zero.
+        tangents = tangents / np.maximum(np.max(np.abs(tangents), axis=1, keepdims=True), 1e-300)
         lengths = np.linalg.norm(tangents, axis=1, keepdims=True)
         if np.any(lengths == 0.0):
             raise InputError(f"{label}: the tangent of node {int(np.argmin(lengths))} is zero.")

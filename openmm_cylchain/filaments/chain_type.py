@@ -15,8 +15,20 @@ import numpy.typing as npt
 from ..beams.curve import BeamElement
 from ..errors import InputError
 from ..mechanics.friction import EndCorrections, SegmentFriction
-from ..units.quantities import TEMPERATURE, positive, thermal_energy
-from ..units.types import FloatArray, Indices, IntArray, Scalar, Vectors
+from ..units.quantities import (
+    DIMENSIONLESS,
+    LENGTH,
+    TEMPERATURE,
+    numbers_to_compute_with,
+    positive,
+    require_kind,
+    shown,
+    thermal_energy,
+    true_or_false,
+    vector,
+    whole_number,
+)
+from ..units.types import FloatArray, Indices, IntArray, Numbers, Scalar, Vectors
 
 
 class ChainType(ABC):
@@ -111,11 +123,13 @@ class ChainType(ABC):
 
     def segment_lengths(self, segments: int, closed: bool = False) -> FloatArray:
         """Rest lengths (segments,) in nm."""
-        return np.full(segments, self.segment_length)
+        true_or_false(closed, "closed")
+        return np.full(number_of(segments, "segments"), self.segment_length)
 
     def segment_stiffnesses(self, segments: int, closed: bool = False) -> FloatArray:
         """Stretching stiffnesses (segments,) in kJ/(mol nm^2)."""
-        return np.full(segments, self.segment_stiffness)
+        true_or_false(closed, "closed")
+        return np.full(number_of(segments, "segments"), self.segment_stiffness)
 
     def straight_lengths(self, segments: int) -> FloatArray:
         """Lengths (segments,) in nm of the segments of a straight open chain on which no forces act."""
@@ -132,33 +146,61 @@ class ChainType(ABC):
         Those of a chain whose nodes have friction are the coefficients of cylinders with the same friction.
         """
 
-    @abstractmethod
-    def stretching_energies(self, lengths: FloatArray, closed: bool = False) -> FloatArray:
+    def stretching_energies(self, lengths: Numbers, closed: bool = False) -> FloatArray:
         """Energies (..., segments) in kJ/mol of all segments of a filament, of lengths (..., segments) in nm."""
+        return self._stretching_energies(_lengths(lengths), true_or_false(closed, "closed"))
 
-    @abstractmethod
-    def stretching_derivatives(self, lengths: FloatArray, closed: bool = False) -> FloatArray:
+    def stretching_derivatives(self, lengths: Numbers, closed: bool = False) -> FloatArray:
         """Derivatives (..., segments) dV_el/dl in kJ/(mol nm), of lengths (..., segments) in nm."""
+        return self._stretching_derivatives(_lengths(lengths), true_or_false(closed, "closed"))
 
-    @abstractmethod
     def bending_energies(
-        self, vectors: FloatArray, stiffnesses: npt.ArrayLike | None = None, closed: bool = False
+        self, vectors: Vectors, stiffnesses: npt.ArrayLike | None = None, closed: bool = False
     ) -> FloatArray:
         """Energies (..., joints) in kJ/mol of the joints of a filament with vectors (..., segments, 3) in nm.
 
         ``stiffnesses`` (joints,) are those of ``Filament.joint_stiffnesses``; of a free chain if not given.
         """
+        vectors, closed = _vectors(vectors), true_or_false(closed, "closed")
+        if stiffnesses is not None:
+            stiffnesses = _stiffnesses(stiffnesses, vectors.shape[-2], closed)
+        return self._bending_energies(vectors, stiffnesses, closed)
 
-    @abstractmethod
-    def bending_end_forces(self, vectors: FloatArray, stiffnesses: FloatArray, closed: bool = False) -> FloatArray:
+    def bending_end_forces(self, vectors: Vectors, stiffnesses: npt.ArrayLike, closed: bool = False) -> FloatArray:
         """Forces (segments, 3) of bending on the plus ends of segments, in kJ/(mol nm); the minus ends have the
-        opposite ones."""
+        opposite ones. ``stiffnesses`` (joints,) are those of ``Filament.joint_stiffnesses``."""
+        vectors, closed = _vectors(vectors, 2), true_or_false(closed, "closed")
+        return self._bending_end_forces(vectors, _stiffnesses(stiffnesses, len(vectors), closed), closed)
 
-    @abstractmethod
-    def check_folds(self, vectors: FloatArray, label: str, closed: bool = False) -> None:
+    def check_folds(self, vectors: Vectors, label: str, closed: bool = False) -> None:
         """Raise InputError if a bending force is not defined between segments with vectors (segments, 3) in nm."""
+        require_kind(label, str, "label")
+        self._check_folds(_vectors(vectors, 2), label, true_or_false(closed, "closed"))
 
     @abstractmethod
+    def _stretching_energies(self, lengths, closed):
+        pass
+
+    @abstractmethod
+    def _stretching_derivatives(self, lengths, closed):
+        pass
+
+    @abstractmethod
+    def _bending_energies(self, vectors, stiffnesses, closed):
+        pass
+
+    @abstractmethod
+    def _bending_end_forces(self, vectors, stiffnesses, closed):
+        pass
+
+    @abstractmethod
+    def _check_folds(self, vectors, label, closed):
+        pass
+
+    @abstractmethod
+    def _draw_chain(self, segments, temperature, generator, start, direction, planar, joint_stiffnesses):
+        pass
+
     def draw_chain(
         self,
         segments: int,
@@ -185,11 +227,52 @@ class ChainType(ABC):
         joint_stiffnesses : (segments - 1,) array, optional
             As ``Filament.joint_stiffnesses``; the type's if not given.
         """
+        segments, planar = number_of(segments, "segments"), true_or_false(planar, "planar")
+        temperature = positive(temperature, TEMPERATURE, "temperature")
+        require_kind(generator, np.random.Generator, "generator")
+        start = vector(start, LENGTH, "start")
+        if direction is not None:
+            direction = vector(direction, DIMENSIONLESS, "direction")
+            if np.hypot(*direction[:2]) == 0.0 and (planar or direction[2] == 0.0):
+                raise InputError("direction must not be the zero vector, or in a plane, along z.")
+        if joint_stiffnesses is not None:
+            joint_stiffnesses = _stiffnesses(joint_stiffnesses, segments, False)
+        return self._draw_chain(segments, temperature, generator, start, direction, planar, joint_stiffnesses)
 
     def persistence_length_at(self, temperature: Scalar) -> float:
         """Persistence length EI/(k_B T) of the continuous filament in nm at a temperature."""
         kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
         return self.bending_rigidity / kT
+
+
+_MOST_SEGMENTS = 10**8
+
+
+def number_of(segments: int, name: str, minimum: int = 1) -> int:
+    """A number of segments or nodes of a filament as an int; InputError if it is none, or beyond all computers."""
+    return whole_number(segments, minimum, name, _MOST_SEGMENTS)
+
+
+def _lengths(lengths):
+    lengths = numbers_to_compute_with(lengths, LENGTH, "lengths")
+    if not lengths.ndim or not lengths.shape[-1]:
+        raise InputError(f"lengths must have the shape (..., segments), but have {lengths.shape}.")
+    return lengths
+
+
+def _vectors(vectors, dimensions=None):
+    vectors = numbers_to_compute_with(vectors, LENGTH, "vectors", 3)
+    if dimensions is not None and vectors.ndim != dimensions:
+        raise InputError(f"vectors must have the shape (segments, 3), but have {vectors.shape}.")
+    return vectors
+
+
+def _stiffnesses(stiffnesses, segments, closed):
+    stiffnesses = numbers_to_compute_with(stiffnesses, DIMENSIONLESS, "stiffnesses")
+    joints = segments if closed else segments - 1
+    if stiffnesses.shape not in ((), (joints,)):
+        raise InputError(f"stiffnesses must have the shape ({joints},), but have {stiffnesses.shape}.")
+    return np.broadcast_to(stiffnesses, (joints,))
 
 
 @dataclass(frozen=True)
@@ -342,7 +425,7 @@ Points = tuple[FloatArray, FloatArray | None]
 def check_type_name(name: object) -> None:
     """Raise InputError unless ``name`` can name a filament type: a residue name that every format can hold."""
     if not (isinstance(name, str) and name.isascii() and name.isalnum() and len(name) <= 5):
-        raise InputError(f"The name of a filament type must be 1 to 5 letters or digits, but is {name!r}.")
+        raise InputError(f"The name of a filament type must be 1 to 5 letters or digits, but is {shown(name)}.")
 
 
 def check_bending_is_given_once(name: str, bending_rigidity: object, persistence_length: object) -> None:

@@ -14,14 +14,13 @@ in a plane,
 """
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
-from ..units.quantities import TEMPERATURE, positive, thermal_energy
+from ..units.quantities import TEMPERATURE, positive, thermal_energy, true_or_false
 from ..units.types import FloatArray, FloatOrArray, Scalar
 
 _GRID = 20001
@@ -60,12 +59,36 @@ class _Marginal:
         self._weight = weight
         self._cumulative = cumulative / cumulative[-1]
 
+    @property
+    def coordinate(self) -> FloatArray:
+        """The grid."""
+        return self._coordinate
+
     def mean(self, function: Callable[[FloatArray], npt.ArrayLike]) -> float:
         """Average of ``function`` (of the coordinate) by Simpson's rule."""
-        values = np.where(self._weight > 0, function(self._coordinate), 0.0)
-        integrands = values * self._weight, self._weight
-        weighted, total = (scipy.integrate.simpson(integrand, x=self._coordinate) for integrand in integrands)
-        return weighted / total
+        return float(self._share @ np.where(self._weight > 0, function(self._coordinate), 0.0))
+
+    def legendre_means(self, count: int) -> FloatArray:
+        """Averages of the Legendre polynomials P_0 to P_(count-1) of the coordinate."""
+        means, before, polynomial = np.empty(count), np.zeros(_GRID), np.ones(_GRID)
+        for order in range(count):
+            means[order] = self._share @ polynomial
+            following = ((2 * order + 1) * self._coordinate * polynomial - order * before) / (order + 1)
+            before, polynomial = polynomial, following
+        return means
+
+    @cached_property
+    def _share(self) -> FloatArray:
+        # Of each point of the grid in averages. Where the spacing is lost to rounding, there is nothing between points.
+        first, second = np.diff(self._coordinate)[::2], np.diff(self._coordinate)[1::2]
+        both = first + second
+        with np.errstate(divide="ignore", invalid="ignore"):
+            parts = [2.0 - second / first, both**2 / (first * second), 2.0 - first / second]
+        share = np.zeros(_GRID)
+        for start, part in enumerate(parts):
+            share[start : start + _GRID - 2 : 2] += both * np.where(np.isfinite(part), part, 0.0)
+        share *= self._weight
+        return share / share.sum()
 
     def sample(self, generator: np.random.Generator, size: int) -> FloatArray:
         """Independent draws by inversion of the cumulative distribution."""
@@ -88,6 +111,7 @@ class SegmentLengthDistribution(_Marginal):
     """
 
     def __init__(self, filament_type: IndependentJoints, temperature: Scalar, planar: bool = False) -> None:
+        planar = true_or_false(planar, "planar")
         kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
         rest, stiffness = filament_type.segment_length, filament_type.segment_stiffness
         if filament_type.maximum_extension is not None:
@@ -197,14 +221,14 @@ def _tangents_in_space(cosines, generator, direction):
     tangent = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
     normal = np.cross(tangent, np.eye(3)[np.argmin(np.abs(tangent))])
     normal /= np.linalg.norm(normal)
-    tangents = [tangent]
-    for cosine, azimuth in zip(cosines, azimuths):
-        binormal = np.cross(tangent, normal)
-        across = np.cos(azimuth) * normal + np.sin(azimuth) * binormal
-        sine = np.sqrt((1.0 - cosine) * (1.0 + cosine))
-        tangent, normal = cosine * tangent + sine * across, cosine * across - sine * tangent
-        tangent /= np.linalg.norm(tangent)
-        normal -= tangent * (tangent @ normal)
-        normal /= np.linalg.norm(normal)
-        tangents.append(tangent)
-    return np.array(tangents)
+    # Rows of a frame are the tangent, the normal and the binormal; each joint turns it in its own axes.
+    sines = np.sqrt((1.0 - cosines) * (1.0 + cosines))
+    along, across, none = np.cos(azimuths), np.sin(azimuths), np.zeros(len(azimuths))
+    turns = [cosines, sines * along, sines * across, -sines, cosines * along, cosines * across, none, -across, along]
+    frame = np.stack([tangent, normal, np.cross(tangent, normal)])
+    tangents = np.empty((len(cosines) + 1, 3))
+    tangents[0] = tangent
+    for joint, turn in enumerate(np.stack(turns, axis=1).reshape(-1, 3, 3)):
+        frame = turn @ frame
+        tangents[joint + 1] = frame[0]
+    return tangents / np.linalg.norm(tangents, axis=1, keepdims=True)

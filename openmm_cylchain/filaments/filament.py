@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..beams.curve import BeamElement
+from ..errors import InputError
+from ..units.quantities import (
+    FORCE,
+    LENGTH,
+    STIFFNESS,
+    finite_number,
+    numbers_to_compute_with,
+    positive,
+    require_kind,
+    true_or_false,
+    vector,
+    whole_number,
+    whole_numbers,
+)
 from ..units.types import FloatArray
 from .chain_type import Chain, ChainType
 from .growth import Growth
@@ -57,6 +72,17 @@ class Filament:
     clamped_tangents: tuple[int, ...] = ()
     growth: Growth | None = None
     spare_nodes: int = 0
+
+    def __post_init__(self) -> None:
+        require_kind(self.type, ChainType, "Filament: type")
+        for name in ("closed", "planar"):
+            true_or_false(getattr(self, name), f"Filament: {name}")
+        for name in ("clamped", "clamped_tangents"):
+            whole_numbers(getattr(self, name), 0, f"Filament: {name}")
+        finite_number(self.propulsion, FORCE, "Filament: propulsion")
+        points = [self.positions] if self.control_points is None else [self.positions, self.control_points]
+        if any(numbers_to_compute_with(own, LENGTH, "Filament: positions", 3).ndim != 2 for own in points):
+            raise InputError("Filament: positions and control_points must have the shape (n, 3).")
 
     @property
     def segments(self) -> int:
@@ -115,3 +141,15 @@ class Tether:
     node: int
     point: tuple[float, float, float]
     stiffness: float
+
+    def __post_init__(self) -> None:
+        for name in ("filament", "node"):
+            object.__setattr__(self, name, whole_number(getattr(self, name), 0, f"Tether: {name}"))
+        if not (isinstance(self.point, tuple) and len(self.point) == 3 and all(map(_is_plain, self.point))):
+            object.__setattr__(self, "point", tuple(vector(self.point, LENGTH, "Tether: point").tolist()))
+        object.__setattr__(self, "stiffness", positive(self.stiffness, STIFFNESS, "Tether: stiffness"))
+
+
+def _is_plain(value):
+    # Many tethers move at once: what has been checked is not checked once more.
+    return type(value) is float and math.isfinite(value)

@@ -15,6 +15,7 @@ from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS, Be
 from ..units.quantities import (
     BENDING_RIGIDITY,
     DIMENSIONLESS,
+    ENERGY,
     FORCE,
     LENGTH,
     MASS,
@@ -23,13 +24,16 @@ from ..units.quantities import (
     TEMPERATURE,
     TIME,
     in_units_of,
+    numbers_to_compute_with,
+    one_of,
     positive,
     thermal_energy,
+    true_or_false,
     whole_number,
 )
 from ..units.types import FloatArray, FloatOrArray, Scalar
 from .beam_elements import BEAM_ELEMENTS
-from .chain_type import ChainType, SegmentKind, check_bending_is_given_once, check_type_name
+from .chain_type import ChainType, SegmentKind, check_bending_is_given_once, check_type_name, number_of
 from .equilibrium import draw_chain
 from .joint_calibration import calibrated_stiffness
 from .straight_segments import STRAIGHT_SEGMENTS
@@ -181,15 +185,21 @@ class FilamentType(ChainType):
                 value = positive(value, dimension, f"{attribute} of filament type {self.name!r}")
                 self._check_magnitude(attribute, value)
                 self._set(attribute, value)
-        if self.mass_per_length is None:
-            self._fail("mass_per_length must be given; 3500 Da/nm if it is left out.")
+        for attribute, usual in (
+            ("diameter", ""),
+            ("segment_length", ""),
+            ("mass_per_length", "; usual are 3500 Da/nm"),
+        ):
+            if getattr(self, attribute) is None:
+                self._fail(f"{attribute} must be given{usual}.")
         self._resolve_bending()
         if (self.stretching_stiffness is None) == (self.stretching_modulus is None):
             self._fail("give either stretching_stiffness (of one segment) or stretching_modulus (EA).")
         if self.extension_relaxation_time is not None and self.extensional_friction is not None:
             self._fail("give either extension_relaxation_time or extensional_friction, not both.")
         self._check_choices()
-        self._check_end_corrections()
+        if not isinstance(self.end_corrections, EndCorrections):
+            self._fail("end_corrections must be an EndCorrections(parallel, perpendicular, rotational).")
         self._check_segment_length()
 
     def _set(self, attribute, value):
@@ -229,10 +239,8 @@ class FilamentType(ChainType):
             ("bending_model", tuple(BENDING_POTENTIALS)),
             ("stretching_model", tuple(STRETCHING_POTENTIALS)),
         ):
-            if getattr(self, attribute) not in choices:
-                self._fail(f"{attribute} must be one of {', '.join(choices)}, but is {getattr(self, attribute)!r}.")
-        if self.friction_length not in ("segment", "filament"):
-            self._check_friction_length()
+            one_of(getattr(self, attribute), choices, f"Filament type {self.name!r}: {attribute}")
+        self._check_friction_length()
         self.segment_kind.check_type(self)
         if (self.stretching_model == "fene") != (self.maximum_extension is not None):
             self._fail("maximum_extension must be given for stretching_model 'fene', and only for it.")
@@ -247,18 +255,12 @@ class FilamentType(ChainType):
             )
 
     def _check_friction_length(self):
+        if isinstance(self.friction_length, str) and self.friction_length in ("segment", "filament"):
+            return
         if isinstance(self.friction_length, str):
             self._fail(f"friction_length must be one of segment, filament, or a length, but is {self.friction_length}.")
         length = positive(self.friction_length, LENGTH, f"friction_length of filament type {self.name!r}")
         self._set("friction_length", length)
-
-    def _check_end_corrections(self):
-        if not isinstance(self.end_corrections, EndCorrections):
-            self._fail("end_corrections must be an EndCorrections(parallel, perpendicular, rotational).")
-        for direction in ("parallel", "perpendicular", "rotational"):
-            value = getattr(self.end_corrections, direction)
-            if not isinstance(in_units_of(value, DIMENSIONLESS, f"{direction} end correction"), float):
-                self._fail(f"the {direction} end correction must be a single number.")
 
     def _check_segment_length(self):
         if self.friction_length != "filament":
@@ -318,8 +320,8 @@ class FilamentType(ChainType):
 
     def node_masses(self, nodes: int, closed: bool = False) -> FloatArray:
         """Masses (nodes,) in Da: that of each segment goes to its two ends in equal parts."""
-        masses = np.full(nodes, self.segment_mass)
-        if not closed:
+        masses = np.full(number_of(nodes, "nodes", 2), self.segment_mass)
+        if not true_or_false(closed, "closed"):
             masses[[0, -1]] *= 0.5
         return masses
 
@@ -336,6 +338,7 @@ class FilamentType(ChainType):
     def stretching_energy(self, length: npt.ArrayLike) -> FloatOrArray:
         """Energy of segments of the given lengths (nm) in kJ/mol."""
         self._refuse_beam("energy of a length alone")
+        length = numbers_to_compute_with(length, LENGTH, "length")
         return self.stretching_potential.energy(
             self.segment_stiffness, self.segment_length, self.maximum_extension, length
         )
@@ -343,35 +346,40 @@ class FilamentType(ChainType):
     def stretching_derivative(self, length: npt.ArrayLike) -> FloatOrArray:
         """Derivative dV_el/dl at the given lengths (nm) in kJ/(mol nm)."""
         self._refuse_beam("energy of a length alone")
+        length = numbers_to_compute_with(length, LENGTH, "length")
         return self.stretching_potential.derivative(
             self.segment_stiffness, self.segment_length, self.maximum_extension, length
         )
 
     def bending_energy(self, cosine: npt.ArrayLike, stiffness: npt.ArrayLike | None = None) -> FloatOrArray:
         """Energy of joints with the given cosines t1.t2 in kJ/mol; ``joint_stiffness`` if no stiffness is given."""
-        if self.bending_rigidity == 0.0:
-            return np.zeros_like(cosine, dtype=float)
-        return self.bending_potential.energy(self.joint_stiffness if stiffness is None else stiffness, cosine)
+        return self._of_joints(self.bending_potential.energy, cosine, stiffness)
 
     def bending_derivative(self, cosine: npt.ArrayLike, stiffness: npt.ArrayLike | None = None) -> FloatOrArray:
         """Derivative dV_b/dc at the given cosines t1.t2 in kJ/mol; ``joint_stiffness`` if no stiffness is given."""
-        if self.bending_rigidity == 0.0:
-            return np.zeros_like(cosine, dtype=float)
-        return self.bending_potential.derivative(self.joint_stiffness if stiffness is None else stiffness, cosine)
+        return self._of_joints(self.bending_potential.derivative, cosine, stiffness)
 
-    def stretching_energies(self, lengths: FloatArray, closed: bool = False) -> FloatArray:
+    def _of_joints(self, function, cosine, stiffness):
+        cosine = numbers_to_compute_with(cosine, DIMENSIONLESS, "cosine")
+        if np.any(np.abs(cosine) > 1.0 + 1e-6):
+            raise InputError("cosine must be between -1 and 1.")
+        if self.bending_rigidity == 0.0:
+            return np.zeros_like(cosine)
+        if stiffness is None:
+            return function(self.joint_stiffness, cosine)
+        return function(numbers_to_compute_with(stiffness, ENERGY, "stiffness"), cosine)
+
+    def _stretching_energies(self, lengths, closed):
         return np.asarray(self.stretching_energy(lengths))
 
-    def stretching_derivatives(self, lengths: FloatArray, closed: bool = False) -> FloatArray:
+    def _stretching_derivatives(self, lengths, closed):
         return np.asarray(self.stretching_derivative(lengths))
 
-    def bending_energies(
-        self, vectors: FloatArray, stiffnesses: npt.ArrayLike | None = None, closed: bool = False
-    ) -> FloatArray:
+    def _bending_energies(self, vectors, stiffnesses, closed):
         return np.asarray(self.bending_energy(_cosines(_tangents(vectors), closed), stiffnesses))
 
-    def bending_end_forces(self, vectors: FloatArray, stiffnesses: FloatArray, closed: bool = False) -> FloatArray:
-        """Forces (segments, 3) of bending on the plus ends of segments, eq. (28).
+    def _bending_end_forces(self, vectors, stiffnesses, closed):
+        """Eq. (28).
 
         A bending torque T on a segment is the pair of forces -T/l and T/l on its ends, with
         T_i = -dV_b/dc (t_j - c t_i) for each joint with a neighbour j (the print of (28) lacks brackets and
@@ -390,8 +398,7 @@ class FilamentType(ChainType):
         plus[behind] -= slope * (tangent[before] - cosine * tangent[behind]) / length[behind, None]
         return plus
 
-    def check_folds(self, vectors: FloatArray, label: str, closed: bool = False) -> None:
-        """Raise InputError for segments (segments, 3) in nm that are antiparallel to their neighbours."""
+    def _check_folds(self, vectors, label, closed):
         if self.bending_rigidity == 0.0 or not self.segment_kind.straight:
             return
         cosines = _cosines(_tangents(vectors), closed)
@@ -403,16 +410,7 @@ class FilamentType(ChainType):
                 "defined; move the node."
             )
 
-    def draw_chain(
-        self,
-        segments: int,
-        temperature: Scalar,
-        generator: np.random.Generator,
-        start: npt.ArrayLike = (0.0, 0.0, 0.0),
-        direction: FloatArray | None = None,
-        planar: bool = False,
-        joint_stiffnesses: FloatArray | None = None,
-    ) -> FloatArray:
+    def _draw_chain(self, segments, temperature, generator, start, direction, planar, joint_stiffnesses):
         self._refuse_beam("draw without control points")
         return draw_chain(self, segments, temperature, generator, start, direction, planar, joint_stiffnesses)
 
@@ -441,6 +439,7 @@ class FilamentType(ChainType):
         SegmentFriction
         """
         segments = whole_number(segments, 1, "segments")
+        thermal_energy(temperature)
         length, logarithm_length = self.segment_length, self._logarithm_length(segments)
         parallel, perpendicular, rotational = self.segment_kind.frictions(
             length, self.diameter, viscosity, self.end_corrections, logarithm_length
@@ -488,7 +487,10 @@ class FilamentType(ChainType):
 
 
 def _tangents(vectors):
-    return vectors / np.linalg.norm(vectors, axis=-1)[..., None]
+    lengths = np.linalg.norm(vectors, axis=-1)
+    if np.any(lengths == 0.0):
+        raise InputError(f"vectors: segment {int(np.argwhere(lengths == 0.0)[0][-1])} has no length, so no direction.")
+    return vectors / lengths[..., None]
 
 
 def _cosines(tangents, closed):

@@ -132,6 +132,58 @@ class MonomerPool:
 
 
 @dataclass(frozen=True, kw_only=True)
+class DynamicInstability:
+    """An end that grows and shrinks in turn, as those of microtubules do.
+
+    While it grows, it has the rates of its monomers; a catastrophe turns it, and a rescue turns it back. With the speed
+    v+ of growth and v- of shrinking, lengths are exponential with the mean v+ v-/(v- f_cat - v+ f_res) where this is
+    positive, and grow without end otherwise (Dogterom and Leibler, Phys. Rev. Lett. 1993, 70, 1347).
+
+    Parameters
+    ----------
+    catastrophe_rate, rescue_rate : 1/time
+        f_cat of a growing end, and f_res of one that shrinks.
+    shrinking_off_rate : 1/time
+        How many monomers it loses per time while it shrinks: v-/length of a monomer.
+    shrinking_on_rate : volume/time, or 1/(concentration*time)
+        k_on while it shrinks.
+
+    The attributes hold plain numbers, in 1/ps and nm^3/ps.
+
+    Raises
+    ------
+    InputError
+        For a rate that is negative or not finite.
+    """
+
+    catastrophe_rate: float
+    rescue_rate: float
+    shrinking_off_rate: float
+    shrinking_on_rate: float = 0.0
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            catastrophe_rate: Scalar,
+            rescue_rate: Scalar,
+            shrinking_off_rate: Scalar,
+            shrinking_on_rate: Scalar = 0.0,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        for name in ("catastrophe_rate", "rescue_rate", "shrinking_off_rate"):
+            object.__setattr__(self, name, non_negative(getattr(self, name), RATE, name))
+        object.__setattr__(self, "shrinking_on_rate", _as_on_rate(self.shrinking_on_rate, "shrinking_on_rate"))
+
+    @property
+    def rates(self) -> tuple[float, float, float, float]:
+        """The rates while it shrinks, on and off, and those of catastrophes and rescues."""
+        return self.shrinking_on_rate, self.shrinking_off_rate, self.catastrophe_rate, self.rescue_rate
+
+
+@dataclass(frozen=True, kw_only=True)
 class Growth:
     """How a filament grows and shrinks at its ends, with detailed balance.
 
@@ -148,11 +200,15 @@ class Growth:
     pool : MonomerPool, or a concentration
         Filaments that are given the same pool share it.
     longest : length
-        For which the filament has nodes. An end without a node left waits: ``FilamentGrowth.waited`` counts how often.
+        For which the filament has nodes. An end that has no node left waits, and ``FilamentGrowth.waited`` counts how
+        often.
     shortest : length, optional
         To which it shrinks at most; half a segment if not given.
     plus_capped, minus_capped : bool
         A capped end neither gains nor loses monomers.
+    plus_instability, minus_instability : DynamicInstability, optional
+        Of an end that grows and shrinks in turn. It begins by growing, and one that has shrunk to the end waits to be
+        rescued.
 
     Raises
     ------
@@ -166,6 +222,8 @@ class Growth:
     shortest: float | None = None
     plus_capped: bool = False
     minus_capped: bool = False
+    plus_instability: DynamicInstability | None = None
+    minus_instability: DynamicInstability | None = None
 
     if TYPE_CHECKING:
 
@@ -178,6 +236,8 @@ class Growth:
             shortest: Scalar | None = None,
             plus_capped: bool = False,
             minus_capped: bool = False,
+            plus_instability: DynamicInstability | None = None,
+            minus_instability: DynamicInstability | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -191,6 +251,12 @@ class Growth:
                 raise InputError(f"longest must exceed shortest, {self.shortest:g} nm, but is {self.longest:g} nm.")
         for name in ("plus_capped", "minus_capped"):
             true_or_false(getattr(self, name), name)
+        for end in ("plus", "minus"):
+            instability = getattr(self, f"{end}_instability")
+            if instability is not None:
+                require_kind(instability, DynamicInstability, f"{end}_instability")
+                if getattr(self, f"{end}_capped"):
+                    raise InputError(f"The {end} end is capped, and has a dynamic instability: leave one of them out.")
         if self.plus_capped and self.minus_capped:
             raise InputError("A filament with two capped ends does not grow: leave its growth out.")
 
@@ -199,6 +265,11 @@ class Growth:
         if getattr(self, f"{end}_capped"):
             return 0.0, 0.0
         return getattr(self.monomers, f"{end}_on_rate"), getattr(self.monomers, f"{end}_off_rate")
+
+    def instability(self, end: str) -> DynamicInstability | None:
+        """That of the "plus" or "minus" end."""
+        instability: DynamicInstability | None = getattr(self, f"{end}_instability")
+        return instability
 
     def monomers_per_segment(self, filament_type: FilamentType) -> int:
         """The monomers of a segment; InputError if they are not a whole number from 2 on."""

@@ -64,12 +64,17 @@ def check_shape(filament_type: ChainType, positions: FloatArray, label: str, clo
         )
     vectors = segment_vectors(positions, closed)
     lengths = np.linalg.norm(vectors, axis=1)
-    if np.any(lengths == 0.0):
-        node = int(np.argmax(lengths == 0.0))
-        raise InputError(f"{label}: nodes {node} and {(node + 1) % len(positions)} coincide; move them apart.")
+    refuse_coinciding(lengths, len(positions), label)
     if filament_type.maximum_extension is not None:
         _check_extension(filament_type, lengths, label)
     filament_type.check_folds(vectors, label, closed)
+
+
+def refuse_coinciding(lengths: FloatArray, nodes: int, label: str) -> None:
+    """Raise InputError for a segment without a length, of the lengths (segments,) in nm between so many nodes."""
+    if np.any(lengths == 0.0):
+        node = int(np.argmax(lengths == 0.0))
+        raise InputError(f"{label}: nodes {node} and {(node + 1) % nodes} coincide; move them apart.")
 
 
 def in_one_plane(positions: FloatArray, segment_length: float, label: str) -> FloatArray:

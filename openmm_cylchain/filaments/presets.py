@@ -80,3 +80,17 @@ ACTIN_ATP = Monomers(
 
 A filament grows by 2.7 nm with a monomer (Holmes et al., Nature 1990, 347, 44). Nucleotides are not told apart.
 """
+
+TUBULIN = Monomers(
+    length=8.0 / 13.0 * unit.nanometer,
+    plus_on_rate=unit.Quantity(8.9e6, _PER_AMOUNT),
+    plus_off_rate=44.0 / unit.second,
+    minus_on_rate=unit.Quantity(4.3e6, _PER_AMOUNT),
+    minus_off_rate=23.0 / unit.second,
+)
+"""Tubulin dimers of microtubules that grow in vitro: Walker et al., J. Cell Biol. 1988, 107, 1437.
+
+Plus end 8.9 /uM/s and 44 /s, minus end 4.3 /uM/s and 23 /s. A dimer of 8 nm is one of 13 protofilaments. While they
+shrink, they lose 733 dimers per second at the plus end and 915 at the minus end: the ``shrinking_off_rate`` of a
+DynamicInstability. How often ends turn depends on the concentration, and much more on what is in a cell.
+"""

@@ -65,6 +65,8 @@ def given(
         raise InputError(f"{label} needs at least two nodes (one segment), but has {len(positions)}.")
     if tangents is not None and control_points is not None:
         raise InputError(f"{label}: give either tangents or control_points, not both.")
+    if true_or_false(closed, f"{label}: closed"):
+        _number_of_ring(len(positions), label)
     nodes, kind = positions.copy(), filament_type.segment_kind
     return nodes, kind.control_points(filament_type, nodes, label, tangents, control_points, closed)
 

@@ -1,6 +1,6 @@
 """The CylinderChainBindingForce of a System: linkers of the compiled engine."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -11,7 +11,6 @@ from ..couplings.beam_curves import BeamCurves
 from ..engine_choice import load_plugin
 from ..errors import InputError
 from ..filaments.filament import Filament
-from ..filaments.grown import rest_lengths
 from ..mechanics.geometry import to_nearest_images
 from ..units.quantities import require_kind, thermal_energy
 from ..units.types import FloatArray, IntArray
@@ -200,16 +199,15 @@ def set_table(force: Any, context: openmm.Context, table: LinkerTable) -> None:
 def pulls_of(
     force: Any,
     table: LinkerTable,
-    filaments: Sequence[Filament],
+    contours: Sequence[FloatArray],
     nodes: Sequence[IntArray],
     positions: FloatArray,
     box: FloatArray | None,
     curves: BeamCurves | None = None,
-    monomers: Mapping[int, IntArray] | None = None,
 ) -> LinkerPulls:
     """What the springs of linkers do; arguments are those of ``places_of``."""
     pulling = table.held == 2
-    places = places_of(force, table, filaments, nodes, positions, box, curves, monomers)[pulling]
+    places = places_of(force, table, contours, nodes, positions, box, curves)[pulling]
     vectors = places[:, 1] - places[:, 0]
     distance = np.linalg.norm(vectors, axis=1)
     parameters = np.array([force.getLinkerTypeParameters(i)[2:4] for i in range(force.getNumLinkerTypes())])
@@ -223,31 +221,28 @@ def pulls_of(
 def places_of(
     force: Any,
     table: LinkerTable,
-    filaments: Sequence[Filament],
+    contours: Sequence[FloatArray],
     nodes: Sequence[IntArray],
     positions: FloatArray,
     box: FloatArray | None,
     curves: BeamCurves | None = None,
-    monomers: Mapping[int, IntArray] | None = None,
 ) -> FloatArray:
     """Where the two ends of linkers hold something: (n, 2, 3) in nm, NaN where they do not.
 
-    By the particles of the nodes of each filament, all positions in nm, and the curves of beam elements. In a box,
-    (3, 3), a second end is at the nearest image of its first one. Of filaments that grow, the first monomer and that
-    behind the last one, by their numbers.
+    By where the segments of each filament begin along it, and its end (``contours_in``), the particles of its nodes,
+    all positions in nm, and the curves of beam elements. In a box, (3, 3), a second end is at the nearest image of its
+    first one.
     """
     places = np.full((len(table), 2, 3), np.nan)
     chains, along = np.asarray(table.filaments), np.asarray(table.arc_lengths)
-    contours = [_present_contour(filament, (monomers or {}).get(i)) for i, filament in enumerate(filaments)]
-    counts = [len(contour) - 1 for contour in contours]
-    minus = np.concatenate([own[:count] for count, own in zip(counts, nodes)])
-    plus = np.concatenate([np.roll(own, -1)[:count] for count, own in zip(counts, nodes)])
+    minus = np.concatenate([own[: len(contour) - 1] for contour, own in zip(contours, nodes)])
+    plus = np.concatenate([np.roll(own, -1)[: len(contour) - 1] for contour, own in zip(contours, nodes)])
     # Of all filaments, one behind the other.
-    ends = np.cumsum([0.0, *(contour[-1] - contour[0] for contour in contours)])
-    begins = np.array([end - contour[0] for end, contour in zip(ends, contours)])
+    begins = np.cumsum([0.0, *(contour[-1] - contour[0] for contour in contours)])
+    begins = begins[:-1] - [contour[0] for contour in contours]
     starts = np.concatenate([begin + contour[:-1] for begin, contour in zip(begins, contours)])
     sizes = np.concatenate([np.diff(contour) for contour in contours])
-    first = np.cumsum([0, *counts])
+    first = np.cumsum([0, *(len(contour) - 1 for contour in contours)])
     for side in (0, 1):
         on = chains[:, side] >= 0
         chain = chains[on, side]
@@ -267,15 +262,6 @@ def places_of(
     both = table.held == 2
     places[both, 1] = places[both, 0] + _nearest(places[both, 1] - places[both, 0], box)
     return places
-
-
-def _present_contour(filament, monomers):
-    # Lengths along a filament that grows are from where its minus end was at the start.
-    if monomers is None:
-        return contour_of(filament)
-    length = filament.growth.monomers.length
-    sizes = rest_lengths(monomers, filament.growth.monomers_per_segment(filament.type), length)
-    return monomers[0] * length + np.concatenate([[0.0], np.cumsum(sizes)])
 
 
 def _nearest(vectors, box):

@@ -11,10 +11,11 @@ from openmm import unit
 from ..engine_choice import load_plugin
 from ..filaments.filament import Filament
 from ..filaments.filament_type import FilamentType
-from ..filaments.grown import count_nodes_of_monomers
+from ..filaments.grown import count_nodes_of_monomers, rest_lengths
 from ..filaments.growth import joints_by_monomers, segments_by_monomers
 from ..units.quantities import AVOGADRO, LENGTH, NUMBER_DENSITY
-from ..units.types import IntArray
+from ..units.types import BoolArray, FloatArray, IntArray
+from .first_places import contour_of
 
 GROWTH_FORCE_NAME = "Growth"
 
@@ -61,6 +62,10 @@ def make_growth_force(filaments: Sequence[Filament], viscosity: float, temperatu
             *growth.rates("minus"),
             *growth.rates("plus"),
         )
+        for end, name in enumerate(("minus", "plus")):
+            instability = growth.instability(name)
+            if instability is not None:
+                force.setDynamicInstability(force.getNumGrowingChains() - 1, end, *instability.rates)
     return force
 
 
@@ -82,6 +87,10 @@ class FilamentGrowth:
     gained, lost, waited : (n, 2) int arrays
         How many monomers each end, minus and plus, has gained and lost since the start, and how often it would have
         gained one, but had no spare node.
+    shrinking : (n, 2) bool array
+        Whether each end shrinks now, of those with dynamic instability.
+    catastrophes, rescues : (n, 2) int arrays
+        How often each end has begun to shrink, and to grow again.
     concentrations : (n,) Quantity in mol/l
         Of free monomers in the pool of each.
     """
@@ -93,14 +102,17 @@ class FilamentGrowth:
     gained: IntArray
     lost: IntArray
     waited: IntArray
+    shrinking: BoolArray
+    catastrophes: IntArray
+    rescues: IntArray
     concentrations: unit.Quantity
 
 
 def growth_of(context: openmm.Context, filaments: Sequence[Filament]) -> FilamentGrowth:
     """How far filaments have grown in a Context of their System."""
     force = find_growth_force(context.getSystem())
-    ends, events, densities = force.getGrowthInContext(context)
-    monomers, counts = np.array(ends).reshape(-1, 2), np.array(events).reshape(-1, 2, 3).astype(int)
+    ends, shrinks, events, densities = force.getGrowthInContext(context)
+    monomers, counts = np.array(ends).reshape(-1, 2), np.array(events).reshape(-1, 2, 5).astype(int)
     numbers, pools = [], []
     for index in range(len(monomers)):
         number, _, pool, *_ = force.getGrowingChainParameters(index)
@@ -119,5 +131,23 @@ def growth_of(context: openmm.Context, filaments: Sequence[Filament]) -> Filamen
         counts[:, :, 0],
         counts[:, :, 1],
         counts[:, :, 2],
+        np.array(shrinks, dtype=bool).reshape(-1, 2),
+        counts[:, :, 3],
+        counts[:, :, 4],
         unit.Quantity(molar, NUMBER_DENSITY * unit.mole).in_units_of(unit.molar),
     )
+
+
+def contours_in(context: openmm.Context, filaments: Sequence[Filament]) -> list[FloatArray]:
+    """Where the segments of filaments in a Context begin along them, with segments at rest, and their ends: a list of
+    (segments + 1,) arrays in nm. Those that grow begin where their minus ends have grown to."""
+    contours = [contour_of(filament) for filament in filaments]
+    if all(filament.growth is None for filament in filaments):
+        return contours
+    present = growth_of(context, filaments)
+    for number, monomers in zip(present.filaments, present.monomers):
+        filament = filaments[number]
+        length = filament.growth.monomers.length
+        rest = rest_lengths(monomers, filament.growth.monomers_per_segment(filament.type), length)
+        contours[number] = monomers[0] * length + np.concatenate([[0.0], np.cumsum(rest)])
+    return contours

@@ -195,7 +195,10 @@ def _as_density(concentration, name):
 
 
 def _as_anchors(anchors, label):
-    plain = np.asarray(getattr(anchors, "_value", anchors))
+    try:
+        plain = np.asarray(getattr(anchors, "_value", anchors))
+    except ValueError:
+        plain = np.asarray(None)
     if plain.ndim == 1 and plain.dtype.kind in "iu":
         if len(plain) and plain.min() < 0:
             raise InputError(f"{label} particles of anchors cannot be negative.")

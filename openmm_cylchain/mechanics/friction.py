@@ -8,7 +8,21 @@ import math
 from dataclasses import dataclass
 
 from ..errors import InputError
-from ..units.quantities import LENGTH, MASS, STIFFNESS, TIME, VISCOSITY, positive, thermal_energy
+from ..units.quantities import (
+    DIMENSIONLESS,
+    FRICTION,
+    LENGTH,
+    MASS,
+    ROTATIONAL_FRICTION,
+    STIFFNESS,
+    TIME,
+    VISCOSITY,
+    finite_number,
+    non_negative,
+    positive,
+    require_kind,
+    thermal_energy,
+)
 from ..units.types import Scalar
 
 
@@ -19,6 +33,11 @@ class EndCorrections:
     parallel: float = -0.114
     perpendicular: float = 0.886
     rotational: float = -0.447
+
+    def __post_init__(self) -> None:
+        for direction in ("parallel", "perpendicular", "rotational"):
+            value = finite_number(getattr(self, direction), DIMENSIONLESS, f"EndCorrections: {direction}")
+            object.__setattr__(self, direction, value)
 
 
 @dataclass(frozen=True)
@@ -39,6 +58,15 @@ class SegmentFriction:
     perpendicular: float
     rotational: float
     extensional: float
+
+    def __post_init__(self) -> None:
+        for name, dimension in (
+            ("parallel", FRICTION),
+            ("perpendicular", FRICTION),
+            ("rotational", ROTATIONAL_FRICTION),
+            ("extensional", ROTATIONAL_FRICTION),
+        ):
+            object.__setattr__(self, name, non_negative(getattr(self, name), dimension, f"SegmentFriction: {name}"))
 
 
 def _logarithm(length, diameter, correction, direction):
@@ -162,6 +190,7 @@ def stokes_friction(diameter: Scalar, viscosity: Scalar) -> float:
 
 def rotational_relaxation_time(friction: SegmentFriction, temperature: Scalar) -> float:
     """Relaxation time of the mean orientation of a free segment, eq. (29): gamma_rot/(2 k_B T), in ps."""
+    require_kind(friction, SegmentFriction, "friction")
     kT = thermal_energy(temperature)
     if kT == 0:
         raise InputError("The rotational relaxation time is infinite at zero temperature.")

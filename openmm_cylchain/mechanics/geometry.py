@@ -12,6 +12,13 @@ import numpy.typing as npt
 
 from ..units.types import FloatArray
 
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+
+
+def cross(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Vector products of vectors (..., 3), of few of them in a third of the time of ``numpy.cross``."""
+    return first[..., _NEXT] * second[..., _LAST] - first[..., _LAST] * second[..., _NEXT]
+
 
 def segment_vectors(nodes: FloatArray, closed: bool = False) -> FloatArray:
     """Vectors from the minus to the plus end of all segments of a chain with node positions (..., n, 3)."""

@@ -111,6 +111,14 @@ def _fene_energy(stiffness, rest_length, maximum_extension, length):
     return np.where(np.abs(relative) < 1.0, energy, np.inf)
 
 
+def _fene_derivative(stiffness, rest_length, maximum_extension, length):
+    extension = length - rest_length
+    left = 1.0 - (extension / maximum_extension) ** 2
+    with np.errstate(divide="ignore"):
+        # Beyond the largest extension the formula turns its sign.
+        return stiffness * np.divide(extension, np.maximum(left, 0.0))
+
+
 STRETCHING_POTENTIALS = {
     potential.name: potential
     for potential in (
@@ -125,7 +133,7 @@ STRETCHING_POTENTIALS = {
         StretchingPotential(
             name="fene",
             energy=_fene_energy,
-            derivative=lambda k, l0, extension, length: k * (length - l0) / (1.0 - ((length - l0) / extension) ** 2),
+            derivative=_fene_derivative,
             expression=("-0.5*stretching_stiffness*maximum_extension^2*log(1-((r-rest_length)/maximum_extension)^2)"),
         ),
     )

@@ -5,6 +5,9 @@ Those of filaments are of Okabe and Ito; motors and crosslinkers differ from eac
 
 from collections.abc import Sequence
 
+PLUS_END, PLUS_END_COLOR = "last node (plus end)", "#101010"
+"""What legends call the mark at the end to which motors walk, and its color."""
+
 FILAMENT_COLORS = ("#0072B2", "#009E73", "#56B4E9", "#6B6B6B")
 _MOTOR_COLORS = ("#B3261E", "#CC79A7", "#6A3D9A")
 _CROSSLINKER_COLORS = ("#F2B200", "#8C6D31", "#C9C400")

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TextIO, TypeAlias
 
 from ..errors import InputError
+from ..units.quantities import shown
 
 TextFile: TypeAlias = str | Path | TextIO
 """A file to write text to: its path, or a file that is open."""
@@ -30,9 +31,16 @@ def _sync_directory(path):
             os.close(descriptor)
 
 
+def as_path(path: str | Path, name: str) -> Path:
+    """The path of a file or directory; InputError if it is none."""
+    if not isinstance(path, (str, os.PathLike)) or not os.fspath(path) or "\0" in str(path):
+        raise InputError(f"{name} must be a path, but is {shown(path)}.")
+    return Path(path)
+
+
 def check_output_path(path: str | Path) -> None:
     """Raise InputError if a file cannot be written there, before hours are spent on its content."""
-    path = Path(path)
+    path = as_path(path, "file")
     if path.is_dir() or not path.parent.is_dir():
         what = "is a directory" if path.is_dir() else f"is in {path.parent}, which is not a directory"
         raise InputError(f"{path} {what}: give the path of a file.")

@@ -8,14 +8,18 @@ from ..units.quantities import LENGTH
 from .files import TextFile
 from .reporters import FilamentsReporter
 
+_OF_END = ("gained", "lost", "waited", "shrinking", "catastrophes", "rescues")
+"""What each end has, as FilamentGrowth says."""
+
 
 class GrowthReporter(FilamentsReporter):
     """Reports how far filaments have grown, a line for each one that grows.
 
     Columns: ``length_nm`` at rest and ``nodes``; ``minus_end`` and ``plus_end``, the number of the first monomer and
     that behind the last one, from 0 on and as they are at the start: a treadmilling filament goes where these go;
-    ``minus_gained``, ``minus_lost``, ``minus_waited``, and the same of ``plus``: how many monomers each end has gained
-    and lost since the start, and how often it would have gained one, but had no spare node; and
+    ``minus_gained``, ``minus_lost``, ``minus_waited``, ``minus_shrinking``, ``minus_catastrophes``, ``minus_rescues``,
+    and the same of ``plus``: how many monomers each end has gained and lost since the start, how often it would have
+    gained one, but had no spare node, whether it shrinks, 0 or 1, and how often it has turned; and
     ``concentration_micromolar`` of free monomers in its pool. ``reporter["plus_end"]`` is an array (reports, filaments
     that grow), in the order of ``reporter.filaments``.
 
@@ -50,7 +54,7 @@ class GrowthReporter(FilamentsReporter):
         "nodes",
         "minus_end",
         "plus_end",
-        *(f"{end}_{what}" for end in ("minus", "plus") for what in ("gained", "lost", "waited")),
+        *(f"{end}_{what}" for end in ("minus", "plus") for what in _OF_END),
         "concentration_micromolar",
     )
     _thing = "filament"
@@ -71,7 +75,7 @@ class GrowthReporter(FilamentsReporter):
         concentrations = 1e6 * growth.concentrations.value_in_unit(unit.molar)
         rows = []
         for index in range(len(growth.filaments)):
-            ends = zip(growth.gained[index], growth.lost[index], growth.waited[index])
+            ends = zip(*(getattr(growth, what)[index].astype(int) for what in _OF_END))
             counts = [count for end in ends for count in end]
             rows.append((lengths[index], growth.nodes[index], *growth.monomers[index], *counts, concentrations[index]))
         return growth.filaments, rows

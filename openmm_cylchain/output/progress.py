@@ -2,12 +2,14 @@
 
 import sys
 import time
+from collections.abc import Callable
 from typing import TextIO
 
 from ..units.text import format_time, time_unit
 
 _REFRESH_SECONDS = 0.2
 _LINE_FRACTION = 0.1
+_SECONDS_BETWEEN_LATE_MESSAGES = 2.0
 
 
 class StatusLine:
@@ -55,6 +57,29 @@ class ProgressMessages:
     def finish(self) -> None:
         """Leave the line that was overwritten."""
         self._line.end()
+
+
+class LateMessages:
+    """Says how many parts of a task are done, if it is not soon done: more and more rarely, since some take minutes.
+
+    ``text`` has two braces, for the number of parts that are done and of all; ``clock`` tells seconds.
+    """
+
+    def __init__(
+        self, say: Callable[[str], None], text: str, parts: int, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._say, self._text, self._parts, self._clock = say, text, parts, clock
+        self._done = 0
+        self._start = clock()
+        self._next = self._start + _SECONDS_BETWEEN_LATE_MESSAGES
+
+    def one_is_done(self) -> None:
+        """Count one more part."""
+        self._done += 1
+        now = self._clock()
+        if now >= self._next:
+            self._next = now + max(_SECONDS_BETWEEN_LATE_MESSAGES, 0.5 * (now - self._start))
+            self._say(self._text.format(self._done, self._parts))
 
 
 class RunProgress:

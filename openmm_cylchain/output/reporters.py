@@ -24,9 +24,9 @@ from ..filaments.grown import GrownChain
 from ..filaments.growth_refusals import refuse_growth
 from ..mechanics.redistribution import ChainSet
 from ..mechanics.tension import axial_tensions, filament_tensions
-from ..units.quantities import whole_number
+from ..units.quantities import LARGEST_INT, shown, true_or_false, whole_number
 from ..units.types import FloatArray, IntArray
-from .files import TextFile
+from .files import TextFile, check_output_path
 from .linker_records import LINKER_COLUMNS, LinkerFile, measure_linkers
 
 if TYPE_CHECKING:
@@ -47,7 +47,8 @@ class TableReporter(ABC):
     _include: tuple[str, ...] = ("positions",)
 
     def __init__(self, file: TextFile | None, reportInterval: int, append: bool = False) -> None:  # noqa: N803 - OpenMM's name
-        self._interval = whole_number(reportInterval, 1, "reportInterval")
+        self._interval = whole_number(reportInterval, 1, "reportInterval", LARGEST_INT)
+        append = true_or_false(append, "append")
         self._rows: list[Any] = []
         self._reports: list[tuple[int, float]] = []
         self._file: Any = None
@@ -55,6 +56,7 @@ class TableReporter(ABC):
         header = ",".join(("step", "time_ps", self._thing, *self._columns))
         stream: Any = file
         if isinstance(file, (str, Path)):
+            check_output_path(file)
             if append:
                 _cut_unfinished_line(Path(file), header)
             stream = open(file, "a" if append else "w", newline="")  # noqa: SIM115 - closed with the reporter
@@ -98,8 +100,8 @@ class TableReporter(ABC):
 
     def __getitem__(self, column: str) -> FloatArray:
         """An array (reports, things) of a column."""
-        if column not in self._columns:
-            raise InputError(f"There is no column {column!r}: known are {', '.join(self._columns)}.")
+        if not isinstance(column, str) or column not in self._columns:
+            raise InputError(f"There is no column {shown(column)}: known are {', '.join(self._columns)}.")
         table = np.array(self._rows, dtype=float).reshape(len(self._rows), -1, len(self._columns))
         return table[:, :, self._columns.index(column)]
 
@@ -247,10 +249,10 @@ class TensionReporter(FilamentsReporter):
     ) -> None:
         require_filaments(filaments)
         refuse_beams(filaments, "a TensionReporter")
+        self._joints = joints = true_or_false(joints, "joints")
+        self._mean = mean = true_or_false(mean, "mean")
         if joints or not mean:
             refuse_growth(filaments, "a TensionReporter of joints or of instantaneous tensions", "Give it mean=True.")
-        self._joints = bool(joints)
-        self._mean = bool(mean)
         self._include = () if mean else ("positions", "forces")
         if joints:
             self._thing, self._columns = "filament,joint", ("tension",)
@@ -390,15 +392,15 @@ class CrosslinkReporter(TableReporter):
 
     def __getitem__(self, column: str) -> npt.NDArray[Any]:
         """An array (lines,) of a column of the file."""
+        known = ("step", "time_ps", self._thing, *self._columns)
+        if not isinstance(column, str) or column not in known:
+            raise InputError(f"There is no column {shown(column)}: known are {', '.join(known)}.")
         if column == "step":
             return np.repeat(self.step, self.count)
         if column == "time_ps":
             return np.repeat(self.time, self.count)
         if column == "crosslink":
             return np.concatenate([np.zeros(0, dtype=int), *self._numbers])
-        if column not in self._columns:
-            known = ("step", "time_ps", self._thing, *self._columns)
-            raise InputError(f"There is no column {column!r}: known are {', '.join(known)}.")
         index = self._columns.index(column)
         kind = int if column.startswith("particle") else float
         return np.array([row[index] for rows in self._rows for row in rows], dtype=kind)
@@ -459,7 +461,9 @@ class LinkerReporter(FilamentsReporter):
         if not filaments.linkers:
             raise InputError("There are no linkers to report: call add_linkers first.")
         if places is not None and not isinstance(places, (str, Path)):
-            raise InputError(f"places must be the path of a file, or None, but is {places!r}.")
+            raise InputError(f"places must be the path of a file, or None, but is {shown(places)}.")
+        if places is not None:
+            check_output_path(places)
         self._linkers = filaments
         self._places: LinkerFile | None = None
         super().__init__(file, reportInterval, filaments, append)

@@ -17,10 +17,10 @@ import openmm
 from openmm import unit
 
 from ..errors import InputError
-from ..units.quantities import LENGTH, MASS, in_units_of, require_kind
+from ..units.quantities import LENGTH, MASS, in_units_of, require_kind, shown
 from ..units.types import BoxVectors, Numbers, Vectors
 from ..version import __version__
-from .files import TextFile
+from .files import TextFile, check_output_path
 
 if TYPE_CHECKING:
     from openmm import app
@@ -214,7 +214,7 @@ def _check_topology(topology, system):
     from openmm import app
 
     if not isinstance(topology, app.Topology):
-        raise InputError(f"topology must be an openmm.app.Topology, but is {topology!r}.")
+        raise InputError(f"topology must be an openmm.app.Topology, but is {shown(topology)}.")
     if system is not None:
         require_kind(system, openmm.System, "system")
     if system is not None and system.getNumParticles() != topology.getNumAtoms():
@@ -232,6 +232,7 @@ def _write(file, text):
     if hasattr(file, "write"):
         file.write(text)
     else:
+        check_output_path(file)
         with open(file, "w", encoding="utf-8") as opened:
             opened.write(text)
 

@@ -10,7 +10,6 @@ _GREYS = ("#333333", "#8A8A8A", "#5E5E5E", "#B0B0B0")
 _PARTICLES = ("#B9BDC6", "#D8B98A", "#9C8FB5", "#A9C4A0")
 
 WALL_COLOR = "#9EA3AD"
-PLUS_END_COLOR = "#101010"
 
 
 def filament_colors(run: Run) -> dict[str, str]:

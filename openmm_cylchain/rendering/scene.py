@@ -11,9 +11,10 @@ from ..analysis.run_filaments import RunParticles
 from ..analysis.runs import Run
 from ..errors import InputError
 from ..mechanics.geometry import segment_vectors
+from ..output.colors import PLUS_END, PLUS_END_COLOR
 from ..units.quantities import PICONEWTON
 from ..units.types import FloatArray, IntArray
-from .colors import PLUS_END_COLOR, filament_colors, linker_colors, particle_colors
+from .colors import filament_colors, linker_colors, particle_colors
 from .outlines import box_edges, wall_lines
 from .tubes import Tubes
 
@@ -205,7 +206,7 @@ def legend_of(run: Run, look: Look) -> list[tuple[str, str, str]]:
     colors = filament_colors(run)
     legend = [(name, color, "filament") for name, color in colors.items()] if look.color == "type" else []
     if has_polarity(run):
-        legend.append(("last node (plus end)", PLUS_END_COLOR, "particle"))
+        legend.append((PLUS_END, PLUS_END_COLOR, "particle"))
     shown = {own.name for own in look.particles_of(run)}
     legend += [(name, color, "particle") for name, color in particle_colors(run).items() if name in shown]
     if look.linkers:

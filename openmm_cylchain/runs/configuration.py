@@ -86,7 +86,7 @@ class Configuration:
 
     ``text`` is the file that it was read from, ``box`` the edges of a box in nm, ``tables`` what was read from each
     table by its name, ``start_files`` the digests of files that filaments start from by their paths, ``lines`` where
-    entries stand.
+    entries stand, ``path`` the name of its file, empty if it has none.
     """
 
     title: str
@@ -108,6 +108,7 @@ class Configuration:
     tables: dict = dataclasses.field(default_factory=dict, compare=False, repr=False)
     start_files: dict = dataclasses.field(default_factory=dict, compare=False)
     lines: dict = dataclasses.field(default_factory=dict, compare=False, repr=False)
+    path: str = dataclasses.field(default="", compare=False, repr=False)
 
     @property
     def relaxes(self):
@@ -129,7 +130,7 @@ def read_configuration(path):
     except UnicodeDecodeError:
         raise InputError(f"The configuration {path} is not UTF-8 text: save it as UTF-8.") from None
     try:
-        return parse_configuration(text, path.parent)
+        return dataclasses.replace(parse_configuration(text, path.parent), path=str(path))
     except InputError as error:
         separator = ", " if str(error).startswith("line ") else ": "
         raise InputError(f"{path}{separator}{error}") from None

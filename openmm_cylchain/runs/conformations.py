@@ -8,10 +8,10 @@ from matplotlib.transforms import ScaledTranslation
 
 from ..analysis.filament_shapes import filament_curves
 from ..mechanics.geometry import unrolled
+from ..output.colors import PLUS_END, PLUS_END_COLOR
 from ..units.text import time_unit
 from .figure_style import FONT_SIZE, legend, length_unit
 
-_PLUS_END = "last node (plus end)"
 _NARROWEST = 0.4
 
 
@@ -60,7 +60,7 @@ class Conformations:
             ends += [] if group.closed else [own[-1, :2] for own in lines]
         if self._polar and ends:
             places = np.array(ends) if self._box is None else np.mod(ends, self._box)
-            axis.plot(*places.T, "o", color="black", markersize=3.5, zorder=3, label=_PLUS_END)
+            axis.plot(*places.T, "o", color=PLUS_END_COLOR, markersize=3.5, zorder=3, label=PLUS_END)
         step = self._records["step"] == frame % len(self._trajectory) * self._steps
         for number, (label, colour) in enumerate(self._springs):
             own = self._records[step & (self._records["type"] == number)]

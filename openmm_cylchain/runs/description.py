@@ -1,9 +1,13 @@
 """The description of a run of a configuration, for ``analysis.load``."""
 
+import math
 from dataclasses import replace
 
 from ..systems.described_runs import describe_system
+from ..units.quantities import PICONEWTON
 from .initial_state import box_vectors
+
+_NO_LOAD = "no pull"
 
 
 def describe(configuration, filaments, system, topology):
@@ -23,13 +27,23 @@ def describe(configuration, filaments, system, topology):
         topology=topology,
         diameters=dict(enumerate(diameters, system.getNumParticles() - len(diameters))),
     )
-    loads = _loads(configuration.filaments)
+    loads = _loads(configuration.pulls, len(filaments))
     return replace(
         description, filaments=tuple(replace(own, load=load) for own, load in zip(description.filaments, loads))
     )
 
 
-def _loads(groups):
-    # Of each filament, as text; empty if they are all alike.
-    differ = len({group.load for group in groups}) > 1
-    return [group.load if differ else "" for group in groups for _ in range(group.count)]
+def _loads(pulls, count):
+    # Of each filament the constant forces on it, as text; empty if they are all alike.
+    found = [[] for _ in range(count)]
+    for pull in pulls:
+        for number in pull.filaments:
+            found[number].append(_in_words(pull))
+    loads = [" + ".join(own) or _NO_LOAD for own in found]
+    return loads if len({*loads}) > 1 else [""] * count
+
+
+def _in_words(pull):
+    if pull.force is None:
+        return f"{pull.tension / PICONEWTON:.3g} pN"
+    return f"{math.hypot(*pull.force) / PICONEWTON:.3g} pN on node {pull.node}"

@@ -5,6 +5,7 @@ import tempfile
 from ..output.run_tables import ENERGY_COLUMNS, GROWTH_TABLE_COLUMNS, LINKER_TABLE_COLUMNS
 from ..units.text import format_time
 from .configuration import linker_labels, named_bound
+from .errors_of_tables import located_instability
 from .growth_summary import ENDS, MICROMOLAR, free_rate
 from .initial_state import recommended_step
 from .run import Recorder, begin, create_simulation, steps
@@ -24,7 +25,7 @@ def dry_run(configuration):
     settings = configuration.simulation
     simulation, built = create_simulation(configuration)
     begin(configuration, simulation, built)
-    recommended = recommended_step(configuration, settings.scheme, settings.engine, settings.seed)
+    recommended = recommended_step(configuration, settings.scheme, settings.engine, settings.seed, built)
     yield configuration.title or "Run"
     yield from _what_is_built(configuration, built)
     yield (
@@ -81,7 +82,7 @@ def _binding(configuration, recommended):
 
 def _cost(configuration, simulation, filaments):
     settings = configuration.simulation
-    with tempfile.TemporaryDirectory() as folder, steps():
+    with tempfile.TemporaryDirectory() as folder, located_instability(configuration), steps():
         recorder = Recorder(configuration, filaments, simulation, RunDirectory(folder), None)
         step, seconds = recorder.seconds_of_run(_MEASURED_SECONDS)
     particles, reports = simulation.system.getNumParticles(), settings.steps // settings.steps_per_report + 1

@@ -7,24 +7,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import openmm
-import scipy
 from openmm import app, unit
 
-from ..beams.curve import curve_points, element_points, element_slopes
+from ..beams.curve import curve_points, element_slopes
 from ..couplings.capsule_contacts import capsule_contact_force, contact_spacing
-from ..couplings.crosslinks import Crosslinks
 from ..couplings.joints import Joints
 from ..couplings.planar_crossings import PlanarSegments
 from ..couplings.pulling import constant_force, constant_tension
 from ..couplings.walls import filament_wall_force, wall_force
 from ..errors import InputError
 from ..filaments import shapes
-from ..filaments.attachments import lengths_along
 from ..filaments.growth import Monomers
 from ..filaments.segment_place import SegmentPlace
+from ..output.progress import LateMessages, ProgressMessages
 from ..systems.filaments import Filaments
 from ..theory import chain_mean_square_end_to_end
 from ..time_steps.recommended_step import recommended_time_step
+from .errors_of_tables import located_errors
+from .initial_links import add_links
 from .keys import ConfigurationError
 
 _ATTEMPTS, _NODES_OF_ATTEMPTS = 2000, 10**5
@@ -50,6 +50,7 @@ class BuiltSystem:
         return {"particle_friction": self.particle_friction, "flow": self.flow}
 
 
+@located_errors
 def build_system(configuration, engine, seed, kinetics=True):
     """The System of a configuration.
 
@@ -65,34 +66,31 @@ def build_system(configuration, engine, seed, kinetics=True):
     -------
     BuiltSystem
     """
-    try:
-        return _built(configuration, engine, seed, kinetics)
-    except ConfigurationError as error:
-        raise error.with_line(configuration.lines) from None
-
-
-def _built(configuration, engine, seed, kinetics):
     filaments = place_filaments(configuration, engine, seed, kinetics)
     topology, system, positions = filaments.build(box_vectors(configuration.box))
     positions, spheres, radii, friction = _add_particles(configuration, seed, topology, system, positions)
-    count = _add_links(configuration, filaments, system, seed)
+    count = add_links(configuration, filaments, system, seed)
     _add_joints(configuration, filaments, system)
+    tables = configuration.tables
     if configuration.contacts is not None:
         own = configuration.contacts
-        force = capsule_contact_force(
-            filaments,
-            system,
-            own.diameter,
-            own.stiffness,
-            spheres,
-            2.0 * radii if len(spheres) else None,
-            own.excluded_neighbors,
-        )
+        with tables["contacts"][0].naming():
+            force = capsule_contact_force(
+                filaments,
+                system,
+                own.diameter,
+                own.stiffness,
+                spheres,
+                2.0 * radii if len(spheres) else None,
+                own.excluded_neighbors,
+            )
         system.addForce(force)
-    for own in configuration.walls:
-        system.addForce(_wall(own, filaments, system, spheres, radii))
-    for own in configuration.pulls:
-        system.addForce(_pull(own, filaments))
+    for own, entries in zip(configuration.walls, tables["wall"]):
+        with entries.naming():
+            system.addForce(_wall(own, filaments, system, spheres, radii))
+    for own, entries in zip(configuration.pulls, tables["pull"]):
+        with entries.naming():
+            system.addForce(_pull(own, filaments))
     return BuiltSystem(filaments, topology, system, positions, friction, configuration.flow, count)
 
 
@@ -112,8 +110,12 @@ def stands_alone(configuration):
     )
 
 
-def recommended_step(configuration, scheme, engine, seed):
-    """The TimeStep that is recommended for a configuration, whose simulation may still be None."""
+@located_errors
+def recommended_step(configuration, scheme, engine, seed, built=None):
+    """The TimeStep that is recommended for a configuration, whose simulation may still be None.
+
+    ``built`` is its BuiltSystem, if there is one.
+    """
     if stands_alone(configuration):
         # The same without building thousands of filaments.
         solvent = configuration.solvent.viscosity, configuration.solvent.temperature
@@ -122,7 +124,8 @@ def recommended_step(configuration, scheme, engine, seed):
             for own in configuration.filaments
         )
         return min(steps, key=lambda step: step.step)
-    built = build_system(configuration, engine, seed)
+    if built is None:
+        built = build_system(configuration, engine, seed)
     return built.filaments.recommended_time_step(scheme, system=built.system, **built.arguments())
 
 
@@ -146,8 +149,13 @@ def place_filaments(configuration, engine, seed, kinetics=True):
     filaments = Filaments(solvent.viscosity, solvent.temperature, engine)
     centers = _grid_centers(configuration.filaments, solvent.temperature) if box is None else None
     planar = None if configuration.contacts is None else PlanarSegments(box_vectors(box))
+    messages = ProgressMessages()
+    progress = LateMessages(
+        messages, "filaments are placed: {} of {}", sum(own.count for own in configuration.filaments)
+    )
     for group in configuration.filaments:
         for index in range(group.count):
+            progress.one_is_done()
             number = len(filaments)
             places = np.random.default_rng([seed, number, 1])
             own = group, index, solvent.temperature, seed, number, places, box, centers
@@ -155,28 +163,31 @@ def place_filaments(configuration, engine, seed, kinetics=True):
             if planar is not None and group.planar:
                 planar.add(number, nodes, group.closed)
             _add(filaments, group, nodes, control_points, kinetics)
+    messages.finish()
     if configuration.contacts is not None:
         for number, filament in enumerate(filaments):
             if not filament.type.segment_kind.straight:
                 diameter = configuration.contacts.diameter
                 filaments.add_beads(number, contact_spacing(filament.type, diameter, solvent.temperature))
-    for own in configuration.tethers:
-        for number in own.filaments:
-            point = filaments[number].positions[own.node] if own.point is None else own.point
-            filaments.add_tether(number, own.node, point, own.stiffness)
-    for own in configuration.linkers if kinetics else ():
+    for own, entries in zip(configuration.tethers, configuration.tables["tether"]):
+        with entries.naming():
+            for number in own.filaments:
+                point = filaments[number].positions[own.node] if own.point is None else own.point
+                filaments.add_tether(number, own.node, point, own.stiffness)
+    for own, entries in zip(configuration.linkers if kinetics else (), configuration.tables["linkers"]):
         anchors = None if own.anchors is None else np.array(own.anchors)
         # What is within reach of an anchor is known when overlaps have come apart: see ``relaxation``.
         later = anchors is not None and configuration.relaxes
-        filaments.add_linkers(
-            own.kind,
-            own.count,
-            concentration=own.concentration,
-            volume=own.volume,
-            anchors=anchors,
-            bound=0 if later else own.bound,
-            seed=seed,
-        )
+        with entries.naming():
+            filaments.add_linkers(
+                own.kind,
+                own.count,
+                concentration=own.concentration,
+                volume=own.volume,
+                anchors=anchors,
+                bound=0 if later else own.bound,
+                seed=seed,
+            )
     return filaments
 
 
@@ -264,13 +275,11 @@ def _inside(group, temperature, seed, number, places, planar):
 
 
 def _attempts(group):
-    # One for a straight filament that fits nowhere.
-    if (
-        group.inside is not None
-        and group.start == "straight"
-        and group.segments * group.type.segment_length > group.inside.diameter
-    ):
-        return 1
+    # One for a filament that fits nowhere: if it is straight, or even one of its segments is too long.
+    if group.inside is not None and group.type.segment_kind.straight:
+        shortest = group.segments if group.start == "straight" else 0.5
+        if shortest * group.type.segment_length > group.inside.diameter:
+            return 1
     return max(20, min(_ATTEMPTS, _NODES_OF_ATTEMPTS // group.nodes))
 
 
@@ -339,7 +348,7 @@ def _wall(own, filaments, system, spheres, radii):
         room = own.shape.room
         for radius in radii:
             if radius >= room:
-                raise InputError(f"A particle with a radius of {radius:g} nm does not fit into a [[wall]].")
+                raise InputError(f"a particle with a radius of {radius:g} nm does not fit into it.")
         return filament_wall_force(
             filaments, system, own.shape, own.stiffness, own.distance, spheres, radii if len(spheres) else 0.0
         )
@@ -353,50 +362,29 @@ def _pull(own, filaments):
     return constant_force([int(filaments.node_indices[number][own.node]) for number in own.filaments], own.force)
 
 
-def _add_links(configuration, filaments, system, seed):
-    # One force for each model; how many links there are.
-    count = 0
-    for model in ("harmonic", "fene"):
-        groups = [(number, own) for number, own in enumerate(configuration.links) if own.model == model]
-        if not groups:
-            continue
-        _, first = groups[0]
-        links = Crosslinks(first.stiffness, first.rest_length or 0.0, model, first.maximum_extension)
-        for number, own in groups:
-            pairs = _pairs(own, filaments, configuration.box, np.random.default_rng([seed, number, 5]))
-            for one, other, distance in pairs:
-                rest = distance if own.rest_length is None else own.rest_length
-                if own.maximum_extension is not None and abs(distance - rest) >= own.maximum_extension:
-                    raise ConfigurationError(
-                        f"{own.label} begins with a length of {distance:g} nm, but its FENE spring of {rest:g} nm "
-                        f"becomes longer or shorter by less than {own.maximum_extension:g} nm: move what it joins, or "
-                        "change rest_length or maximum_extension.",
-                        ("link", number),
-                    )
-                links.add(None, one, other, own.stiffness, rest, own.maximum_extension)
-            count += len(pairs)
-        links.add_to(system)
-    return count
-
-
 def _add_joints(configuration, filaments, system):
     if not configuration.joints:
         return
     joints = Joints(configuration.joints[0].stiffness)
-    for own in configuration.joints:
-        # The filament comes first, and a direction second.
-        places, vectors = zip(
-            *sorted((_tangent(entries, filaments) for entries in own.between), key=lambda one: one[0] is None)
-        )
-        second = vectors[1] if places[1] is None else places[1]
-        cosine = vectors[0] @ vectors[1] / np.prod(np.linalg.norm(vectors, axis=1))
-        angle = float(np.arccos(np.clip(cosine, -1.0, 1.0))) if own.angle is None else min(own.angle, np.pi)
-        if angle > 0.5 * np.pi * (1.0 + 1e-12):
-            # The same as the rest of a straight angle with the opposite of one of the two.
-            second = _opposite(second)
-            angle = np.pi - angle
-        joints.add(None, places[0], second, angle, own.stiffness)
+    for own, entries in zip(configuration.joints, configuration.tables["joint"]):
+        with entries.naming():
+            _add_joint(own, joints, filaments)
     joints.add_to(system)
+
+
+def _add_joint(own, joints, filaments):
+    # The filament comes first, and a direction second.
+    places, vectors = zip(
+        *sorted((_tangent(entries, filaments) for entries in own.between), key=lambda one: one[0] is None)
+    )
+    second = vectors[1] if places[1] is None else places[1]
+    cosine = vectors[0] @ vectors[1] / np.prod(np.linalg.norm(vectors, axis=1))
+    angle = float(np.arccos(np.clip(cosine, -1.0, 1.0))) if own.angle is None else min(own.angle, np.pi)
+    if angle > 0.5 * np.pi * (1.0 + 1e-12):
+        # The same as the rest of a straight angle with the opposite of one of the two.
+        second = _opposite(second)
+        angle = np.pi - angle
+    joints.add(None, places[0], second, angle, own.stiffness)
 
 
 def _tangent(entries, filaments):
@@ -424,59 +412,3 @@ def _opposite(tangent):
     if isinstance(tangent, SegmentPlace):
         return SegmentPlace(tangent.second, tangent.first, 1.0 - tangent.fraction)
     return -tangent
-
-
-def _pairs(own, filaments, box, generator):
-    # Pairs of places, with their distances in nm.
-    if own.between is None:
-        return _random_pairs(own, filaments, box, generator)
-    places, points = zip(*(_place(entries, filaments) for entries in own.between))
-    return [(*places, float(np.linalg.norm(_nearest(points[1] - points[0], box))))]
-
-
-def _nearest(vectors, box):
-    return vectors if box is None else vectors - np.round(vectors / box) * box
-
-
-def _place(entries, filaments):
-    if entries["point"] is not None:
-        return entries["point"], np.array(entries["point"])
-    number, nodes = entries["filament"], filaments[entries["filament"]].positions
-    if entries["node"] is not None:
-        return int(filaments.node_indices[number][entries["node"]]), nodes[entries["node"]]
-    place = filaments.segment_place(number, entries["arc_length"], entries["segment"], entries["fraction"])
-    return place, _position_of(place, filaments, number)
-
-
-def _position_of(place, filaments, number):
-    first, own = filaments.node_indices[number][0], filaments[number]
-    nodes = own.positions
-    if own.control_points is not None:
-        element = np.array([place.first, place.second]) - first
-        return element_points(nodes[element], own.control_points[element], [place.fraction])[0, 0]
-    return (1.0 - place.fraction) * nodes[place.first - first] + place.fraction * nodes[place.second - first]
-
-
-def _random_pairs(own, filaments, box, generator):
-    places, points, owners = [], [], []
-    for number, filament in enumerate(filaments):
-        length = float(lengths_along(filament.type, filament.segments, filament.closed).sum())
-        spacing = 0.5 * filament.type.segment_length if own.spacing is None else own.spacing
-        # In the middle of equal parts, so that ends have no more links than other places.
-        parts = max(1, int(length / spacing + 1e-9))
-        for part in range(parts):
-            place = filaments.segment_place(number, arc_length=length * (part + 0.5) / parts)
-            places.append(place)
-            points.append(_position_of(place, filaments, number))
-            owners.append(number)
-    points, owners = np.array(points), np.array(owners)
-    if box is not None and own.within >= 0.5 * min(box):
-        raise InputError(f"{own.label} within must be less than half of the shortest edge of the box, {min(box):g} nm.")
-    wrapped = points if box is None else np.mod(points, box) % box
-    found = scipy.spatial.cKDTree(wrapped, boxsize=box).query_pairs(own.within, output_type="ndarray")
-    found = found[owners[found[:, 0]] != owners[found[:, 1]]]
-    found = found[np.lexsort((found[:, 1], found[:, 0]))]
-    if own.count is not None and len(found) > own.count:
-        found = found[np.sort(generator.choice(len(found), own.count, replace=False))]
-    distances = np.linalg.norm(_nearest(points[found[:, 1]] - points[found[:, 0]], box), axis=1)
-    return [(places[one], places[other], float(length)) for (one, other), length in zip(found, distances)]

@@ -4,6 +4,7 @@ Each kind has ``read(value, place)``, which returns plain numbers in OpenMM's un
 ``schema()``; ``example``, as it is written in TOML; and ``text``, what it is called in the reference.
 """
 
+import datetime
 import difflib
 import math
 from dataclasses import dataclass, field
@@ -13,6 +14,8 @@ from ..units import quantities as units
 from ..units.text import example as example_of
 from ..units.text import kind_of, parse_quantity
 from .toml_lines import line_of
+
+_LONGEST_VALUE = 200
 
 REQUIRED = object()
 """The default of a key that must be given."""
@@ -50,10 +53,28 @@ class ConfigurationError(InputError):
         super().__init__(message)
         self.path = path
 
-    def with_line(self, lines):
-        """The same with its line in front, if it is known; ``lines`` are those of ``toml_lines.lines_of``."""
+    def with_line(self, lines, file=""):
+        """The same with its file and line in front, as far as they are known.
+
+        ``lines`` are those of ``toml_lines.lines_of``.
+        """
         line = line_of(lines, self.path)
-        return self if line is None else ConfigurationError(f"line {line}: {self}")
+        if line is None and not file:
+            return self
+        return LocatedError(f"{place_in_words(file, line)}: {self}")
+
+
+class LocatedError(ConfigurationError):
+    """A mistake whose message begins with its line, and its file if there is one."""
+
+    def with_line(self, lines, file=""):
+        """The same."""
+        return self
+
+
+def place_in_words(file, line):
+    """A file and a line, either of which may be missing (empty, or None)."""
+    return ", ".join([*([str(file)] if file else []), *([] if line is None else [f"line {line}"])])
 
 
 @dataclass(frozen=True)
@@ -87,6 +108,24 @@ class Key:
         return f"{self.name} = {self.kind.example}"
 
 
+def as_written(value):
+    """A value that tomllib has read, about as the file has it, in a line that is not too long."""
+    text = _in_toml(value)
+    return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}..."
+
+
+def _in_toml(value):
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (datetime.date, datetime.time)):
+        return value.isoformat()
+    if isinstance(value, list):
+        return f"[{', '.join(map(_in_toml, value))}]"
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{name} = {_in_toml(own)}' for name, own in value.items())} }}" if value else "{}"
+    return repr(value)
+
+
 def close_match(text, choices):
     """A sentence that names the choice that is nearest to a text, or nothing."""
     close = difflib.get_close_matches(str(text), list(choices), n=1)
@@ -109,6 +148,10 @@ class Quantity:
         return kind_of(self.unit)
 
     def read(self, value, place):
+        if not isinstance(value, str):
+            raise place.error(
+                f"must be a text with a number and a unit, as in {self.example}, but is {as_written(value)}."
+            )
         try:
             number = parse_quantity(value, self.unit, place.name)
         except InputError as error:
@@ -163,7 +206,7 @@ class Whole:
 
     def read(self, value, place):
         if isinstance(value, bool) or not isinstance(value, int):
-            raise place.error(f"must be a whole number, but is {value!r}.")
+            raise place.error(f"must be a whole number, but is {as_written(value)}.")
         if value < self.minimum:
             raise place.error(f"must be at least {self.minimum}, but is {value}.")
         if self.maximum is not None and value > self.maximum:
@@ -184,9 +227,9 @@ class Number:
 
     def read(self, value, place):
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise place.error(f"must be a finite number without a unit, but is {value!r}.")
+            raise place.error(f"must be a finite number without a unit, but is {as_written(value)}.")
         if value and not 1e-15 <= abs(value) <= 1e15:
-            raise place.error(f"must be zero or between 1e-15 and 1e15 in size, but is {value!r}.")
+            raise place.error(f"must be zero or between 1e-15 and 1e15 in size, but is {as_written(value)}.")
         return float(value)
 
     def schema(self):
@@ -202,9 +245,9 @@ class Text:
 
     def read(self, value, place):
         if not isinstance(value, str):
-            raise place.error(f"must be a text in quotes, but is {value!r}.")
+            raise place.error(f"must be a text in quotes, but is {as_written(value)}.")
         if any(not character.isprintable() for character in value):
-            raise place.error(f"must be one line of printable characters, but is {value!r}.")
+            raise place.error(f"must be one line of printable characters, but is {as_written(value)}.")
         return value
 
     def schema(self):
@@ -227,10 +270,10 @@ class Choice:
 
     def read(self, value, place):
         if not isinstance(value, str):
-            raise place.error(f"must be a text in quotes, but is {value!r}.")
+            raise place.error(f"must be a text in quotes, but is {as_written(value)}.")
         if value not in self.words:
             raise place.error(
-                f"must be one of {', '.join(self.words)}, but is {value!r}.{close_match(value, self.words)}"
+                f"must be one of {', '.join(self.words)}, but is {as_written(value)}.{close_match(value, self.words)}"
             )
         return value
 
@@ -247,7 +290,7 @@ class Flag:
 
     def read(self, value, place):
         if not isinstance(value, bool):
-            raise place.error(f"must be true or false, without quotes, but is {value!r}.")
+            raise place.error(f"must be true or false, without quotes, but is {as_written(value)}.")
         return value
 
     def schema(self):
@@ -269,7 +312,7 @@ class Triple:
 
     def read(self, value, place):
         if not isinstance(value, list) or len(value) != 3:
-            raise place.error(f"must be a list of three, as in {self.example}, but is {value!r}.")
+            raise place.error(f"must be a list of three, as in {self.example}, but is {as_written(value)}.")
         items = tuple(self.kind.read(item, place.item(index)) for index, item in enumerate(value))
         if self.not_zero and items == (0.0, 0.0, 0.0):
             raise place.error("must not be the zero vector.")
@@ -307,7 +350,7 @@ class Listing:
 
     def read(self, value, place):
         if not isinstance(value, list) or len(value) < self.least:
-            raise place.error(f"must be a list of {self.what}, as in {self.example}, but is {value!r}.")
+            raise place.error(f"must be a list of {self.what}, as in {self.example}, but is {as_written(value)}.")
         return tuple(self.kind.read(item, place.item(index)) for index, item in enumerate(value))
 
     def schema(self):
@@ -351,7 +394,7 @@ class Inline:
 
     def read(self, value, place):
         if not isinstance(value, dict):
-            raise place.error(f"must be a table, as in {place.path[-1]} = {self.example}, but is {value!r}.")
+            raise place.error(f"must be a table, as in {place.path[-1]} = {self.example}, but is {as_written(value)}.")
         return self.table.read(value, place)
 
     def schema(self):
@@ -368,7 +411,7 @@ class Pair:
 
     def read(self, value, place):
         if not isinstance(value, list) or len(value) != 2 or not all(isinstance(own, dict) for own in value):
-            raise place.error(f"must be a list of two tables, as in {self.example}, but is {value!r}.")
+            raise place.error(f"must be a list of two tables, as in {self.example}, but is {as_written(value)}.")
         return tuple(self.table.read(own, place.item(index)) for index, own in enumerate(value))
 
     def schema(self):

@@ -11,6 +11,8 @@ from .. import analysis
 from ..analysis.statistics import mean_with_error
 from ..errors import InputError, PrecisionWarning
 from ..mechanics.geometry import segment_vectors
+from ..output.colors import PLUS_END
+from ..output.run_files import RunFiles
 from ..output.run_tables import MILLISECOND
 from ..units.quantities import thermal_energy
 from .growth_summary import ENDS, GrowthTable
@@ -27,7 +29,7 @@ ORDER = "nematic order of filaments"
 BUNDLED = "share of filaments in bundles"
 JOINED = "share of filaments in the largest joined network"
 GYRATION = "radius of gyration of all filaments"
-GLIDING = {1.0: "gliding speed, last node (plus end) ahead", -1.0: "gliding speed, first node (minus end) ahead"}
+GLIDING = {1.0: f"gliding speed, {PLUS_END} ahead", -1.0: "gliding speed, first node (minus end) ahead"}
 PULLING = "force of moving tethers along their velocity"
 WALLS = "sum of forces of walls"
 CONTACTS = "sum of forces of contacts on a filament"
@@ -70,22 +72,28 @@ class Course:
     shares: dict
 
 
-def measure(configuration, directory):
-    """What matters of a run that is complete: a list of Measure, empty for free filaments."""
-    run = _load(directory)
+def load_run(directory):
+    """The Run in a directory, see ``analysis.load``."""
+    with warnings.catch_warnings():
+        # The notes of the summary say it.
+        warnings.simplefilter("ignore", PrecisionWarning)
+        return analysis.load(directory.path)
+
+
+def measure(configuration, run):
+    """What matters of a run that is complete: a list of Measure, empty for free filaments; see ``load_run``."""
     ends = (0, len(run) - 1)
     found = [
         *((name, dict(zip(("first", "last"), values))) for name, values in _of_networks(configuration, run, ends)),
         *_of_gliding(configuration, run),
         *_of_forces(configuration, run),
-        *_of_growth(configuration, directory),
+        *_of_growth(configuration, run),
     ]
     return [Measure(name, MEASURES[name], **values) for name, values in found]
 
 
-def course(configuration, directory):
+def course(configuration, run):
     """The Course of a network of filaments in up to forty frames; None where filaments are not one."""
-    run = _load(directory)
     if len(run.filaments) < _FEWEST_OF_NETWORK or any(map(is_in_equilibrium, configuration.filaments)):
         return None
     frames = np.unique(np.linspace(0, len(run) - 1, min(len(run), _FRAMES_OF_COURSE)).round().astype(int)).tolist()
@@ -96,13 +104,6 @@ def course(configuration, directory):
         radii = np.array(found.pop(GYRATION))
         found["radius of gyration of all, over that at the start"] = radii / radii[0]
     return Course(run.times[frames] / MILLISECOND, found)
-
-
-def _load(directory):
-    with warnings.catch_warnings():
-        # The notes of the summary say it.
-        warnings.simplefilter("ignore", PrecisionWarning)
-        return analysis.load(directory.path)
 
 
 def _of_networks(configuration, run, frames):
@@ -195,11 +196,11 @@ def _of_forces(configuration, run):
             yield name, {"mean": mean, "standard_error": error}
 
 
-def _of_growth(configuration, directory):
+def _of_growth(configuration, run):
     growing = [group for group in configuration.filaments if group.growth is not None]
     if not growing:
         return
-    table = GrowthTable(directory)
+    table = GrowthTable(RunFiles(run.path))
     lengths, late = table.column("length (nm)"), slice(len(table.times) // 2, None)
     found = {"first": float(lengths[0].mean()), "last": float(lengths[-1].mean())}
     if len(lengths[late]) > 1:

@@ -1,13 +1,12 @@
 """Filaments that are drawn on top of each other come apart before a run begins."""
 
-import time
 from dataclasses import replace
 
 from openmm import Context, OpenMMException, Platform
 
 from ..errors import InputError, InstabilityError
 from ..kinetics.binding_force import find_binding_force, place_linkers
-from ..output.progress import ProgressMessages
+from ..output.progress import LateMessages, ProgressMessages
 from ..systems.refused_context import refusal
 from .initial_state import box_vectors, build_system
 
@@ -16,7 +15,6 @@ _COLD, _WARM = (1e-3, 1e-2, 0.1, 0.5), (0.1, 0.5, 1.0)
 _STEPS = 20
 _COLD_TEMPERATURE = 1.0
 _ALL_STEPS = _STEPS * (len(_COLD) + len(_WARM))
-_SECONDS_BETWEEN_MESSAGES = 2.0
 
 
 def relaxed_positions(configuration, built, say=None):
@@ -40,12 +38,16 @@ def relaxed_positions(configuration, built, say=None):
     if not configuration.relaxes:
         return built.positions
     if say is not None:
-        return _begun(configuration, built, _Progress(say))
+        return _begun(configuration, built, _progress(say))
     messages = ProgressMessages()
     try:
-        return _begun(configuration, built, _Progress(messages))
+        return _begun(configuration, built, _progress(messages))
     finally:
         messages.finish()
+
+
+def _progress(say):
+    return LateMessages(say, "filaments that overlap come apart before the first step: {} of {} steps", _ALL_STEPS)
 
 
 def _begun(configuration, built, progress):
@@ -98,27 +100,10 @@ def _come_apart(configuration, positions, progress):
                 integrator.setStepSize(length * longest)
                 for _ in range(_STEPS):
                     integrator.step(1)
-                    progress.step_is_done()
+                    progress.one_is_done()
     except (InstabilityError, OpenMMException) as error:
         raise InputError(
             f"[contacts] filaments that overlap at first have not come apart: {error} Begin with fewer filaments, "
             "with a smaller diameter or time_step, or set relax = false."
         ) from None
     return context.getState(positions=True).getPositions(asNumpy=True)
-
-
-class _Progress:
-    # Silent if it is soon done. Lines become rarer, since some starts take minutes.
-
-    def __init__(self, say):
-        self._say = say
-        self._done = 0
-        self._start = time.monotonic()
-        self._next = _SECONDS_BETWEEN_MESSAGES
-
-    def step_is_done(self):
-        self._done += 1
-        elapsed = time.monotonic() - self._start
-        if elapsed >= self._next:
-            self._next = elapsed + max(_SECONDS_BETWEEN_MESSAGES, 0.5 * elapsed)
-            self._say(f"filaments that overlap come apart before the first step: {self._done} of {_ALL_STEPS} steps")

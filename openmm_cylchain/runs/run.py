@@ -34,6 +34,7 @@ from ..units.quantities import thermal_energy
 from ..units.text import format_time
 from .countless_events import refuse_countless_events
 from .description import describe
+from .errors_of_tables import located_errors, located_instability
 from .initial_state import build_system
 from .moving_tethers import MovingTethers
 from .relaxation import relaxed_positions
@@ -99,7 +100,7 @@ def run(configuration, output, resume=False):
             _check_crosslinks(directory, simulation, checkpoint.step)
             print(f"Resuming at step {checkpoint.step}, {format_time(checkpoint.step * settings.time_step)}.")
         try:
-            with steps():
+            with located_instability(configuration), steps():
                 Recorder(configuration, filaments, simulation, directory, checkpoint).run_to_end()
         except InstabilityError as error:
             raise type(error)(
@@ -109,6 +110,7 @@ def run(configuration, output, resume=False):
             ) from None
 
 
+@located_errors
 def create_simulation(configuration):
     """The Simulation of a configuration, without positions, and its BuiltSystem.
 
@@ -134,6 +136,7 @@ def create_simulation(configuration):
         raise refusal(error, built.system, integrator, platform) from None
 
 
+@located_errors
 def begin(configuration, simulation, built):
     """Bring a Simulation of a configuration to where the run begins, and return the positions."""
     positions = relaxed_positions(configuration, built)
@@ -153,6 +156,7 @@ def steps():
         raise InstabilityError(f"A step cannot be taken: {error}.") from None
 
 
+@located_errors
 def check_step(configuration, seconds=20.0, say=lambda message: None):
     """Run a configuration for a while with its step and a sixteenth of it: see ``step_check.check_time_step``.
 
@@ -180,7 +184,7 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
     positions = relaxed_positions(configuration, built, say)
     platform, properties = _platform(settings, built.filaments.engine)
     # An interruption that Python raises within a step may end as an error of OpenMM.
-    with Signals() as signals, steps():
+    with Signals() as signals, located_instability(configuration), steps():
         check = check_time_step(
             built.filaments,
             built.system,
@@ -337,7 +341,7 @@ class Recorder:
             self._timed_steps(1)  # which sets things up
             self._report()
             start, first, work = time.monotonic(), self._step, [(0, time.process_time())]
-            while self._step < max(settings.steps, 2) and time.monotonic() - start < most:
+            while self._step == first or (self._step < max(settings.steps, 2) and time.monotonic() - start < most):
                 chunk = self._timed_steps(self._limited(chunk))
                 if moving and self._step % moving.interval == 0:
                     moving.move(self._simulation.context, self._step)

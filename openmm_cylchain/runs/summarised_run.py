@@ -2,7 +2,7 @@
 
 from .growth_summary import summarise_growth
 from .linker_summary import summarise_linkers
-from .measures import measure
+from .measures import course, load_run, measure
 from .run import run
 from .run_directory import RunDirectory
 from .summary import group_members, load_trajectory, summarise
@@ -20,9 +20,10 @@ def run_with_summary(configuration, output, resume=False):
     trajectory = load_trajectory(configuration, directory)
     groups = summarise(configuration, trajectory)
     linkers = summarise_linkers(configuration, directory)
-    measures = measure(configuration, directory)
+    own = load_run(directory)
+    measures = measure(configuration, own)
     growth = summarise_growth(configuration, group_members(configuration), directory)
     # The summary comes last: a run that has one is complete.
-    write_figure(configuration, directory, trajectory)
+    write_figure(configuration, directory, trajectory, course(configuration, own))
     write_summary(configuration, directory, groups, linkers, measures, growth)
     return groups, linkers, measures, growth

@@ -25,7 +25,6 @@ from .configuration import linker_labels
 from .conformations import Conformations
 from .figure_style import FONT_SIZE, legend, legend_below, length_unit
 from .growth_panels import draw_growth
-from .measures import course
 from .summary import (
     extensions,
     group_labels,
@@ -40,9 +39,11 @@ _STRETCHING_COLOUR, _BENDING_COLOUR = "#D55E00", "#0072B2"
 _LEAST_ANGLE = 1e-9
 
 
-def write_figure(configuration, directory, trajectory):
-    """Draw the figure of a run into its directory as PNG; see ``summary.load_trajectory``."""
-    network = course(configuration, directory)
+def write_figure(configuration, directory, trajectory, network):
+    """Draw the figure of a run into its directory as PNG.
+
+    See ``summary.load_trajectory``; ``network`` is its Course, or None.
+    """
     # Titles and names are of users: "$" is no mathematics in them.
     with rc_context({"text.parse_math": False}):
         image = _draw(configuration, directory, trajectory, network)

@@ -11,13 +11,17 @@ from .keys import REQUIRED, ConfigurationError, Key, Place, close_match
 class UnknownKeyError(ConfigurationError):
     """A key that a table does not have, beside the names of those that it has."""
 
-    def __init__(self, place, name, names):
+    def __init__(self, place, name, names, value=None):
         super().__init__(f"{place.name} has an unknown key {name!r}.", (*place.path, name))
         self.name = name
         self.names = names
+        self.value = value
 
     def with_suggestion(self, others):
         """The same with what would be right: where else a key of that name belongs to, or one with a similar name."""
+        for other in others:
+            if other.name == self.name and not other.owner and isinstance(self.value, (dict, list)):
+                return ConfigurationError(f"{self} It is a table of its own: write {other.header}.", self.path)
         for other in others:
             if other.names != self.names and self.name in other.names:
                 return ConfigurationError(f"{self} It belongs to {other.owner or other.header}.", self.path)
@@ -137,7 +141,7 @@ class TableKind:
         for name, value in table.items():
             own = Entries.place_of(place, name)
             if name not in kinds:
-                raise UnknownKeyError(place, name, self.names)
+                raise UnknownKeyError(place, name, self.names, value)
             values[name] = kinds[name].kind.read(value, own)
         entries = Entries(self, values, place)
         entries.require(*(key.name for key in self.keys if key.default is REQUIRED))

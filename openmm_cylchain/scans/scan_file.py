@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..errors import InputError
+from ..output.files import as_path
 from ..runs.configuration import TABLES, configuration_of, read_configuration
 from ..runs.keys import Choice, ConfigurationError, Inline, Key, Listing, Place, Text, Whole
 from ..runs.table import TableKind, UnknownKeyError
@@ -80,7 +81,7 @@ def read_scan(path):
     InputError
         For a file that cannot be read, or describes no scan: with its line, table and key.
     """
-    path = Path(path)
+    path = as_path(path, "path")
     try:
         text = path.read_bytes().decode("utf-8")
     except OSError as error:

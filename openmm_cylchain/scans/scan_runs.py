@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
-from ..output.files import write_atomically
+from ..output.files import as_path, write_atomically
 from ..output.run_files import RunFiles, try_lock
+from ..units.quantities import require_callable, shown, whole_number
 from .one_run import Task, end_all, perform
 from .scan_figure import write_scan_figure
 from .scan_file import Scan, read_scan
@@ -77,10 +78,11 @@ def scan(configuration, output, executor=None, workers=None, say=print):
     if executor is not None and workers is not None:
         raise InputError("Give workers or an executor, which has workers of its own, not both.")
     if executor is not None and not callable(getattr(executor, "submit", None)):
-        raise InputError(f"executor must be one of concurrent.futures, but is {executor!r}.")
-    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
-        raise InputError(f"workers must be a whole number of at least 1, but is {workers!r}.")
-    path = Path(output).absolute()
+        raise InputError(f"executor must be one of concurrent.futures, but is {shown(executor)}.")
+    if workers is not None:
+        workers = whole_number(workers, 1, "workers")
+    require_callable(say, "say")
+    path = as_path(output, "output").absolute()
     if path.exists() and not path.is_dir():
         raise InputError(f"The output directory {path} is a file: choose another name.")
     path.mkdir(parents=True, exist_ok=True)

@@ -51,7 +51,11 @@ class AddedFilaments:
         return f"<Filaments at {self._temperature:g} K, {self._engine_name} engine: {shown or 'none yet'}>"
 
     def __getitem__(self, index: int) -> Filament:
-        return self._filaments[index]
+        count = len(self)
+        number = whole_number(index, -count, "The number of a filament")
+        if number >= count:
+            raise InputError(f"Filament {number} does not exist; there are {count}.")
+        return self._filaments[number]
 
     def __iter__(self) -> Iterator[Filament]:
         return iter(self._filaments)

@@ -191,7 +191,9 @@ class Filaments(TiedFilaments):
                 system, attachment, self._nodes[number], self._control_points[number]
             )
         own = self._filaments[number]
-        return attachment_positions(attachments, own.positions, own.control_points)
+        segments = np.array([one.segment for one in attachments], dtype=int)
+        fractions = np.array([one.fraction for one in attachments], dtype=float)
+        return attachment_positions(segments, fractions, own.positions, own.control_points)
 
     def _coinciding(self):
         for number, nodes in enumerate(self._nodes):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,12 +23,21 @@ from ..kinetics.binding_force import (
     set_table,
     table_of,
 )
-from ..kinetics.growth_force import FilamentGrowth, growth_of
+from ..kinetics.growth_force import FilamentGrowth, contours_in, growth_of
 from ..kinetics.linker_table import LinkerTable
 from ..kinetics.linkers import LinkerPulls
 from ..mechanics.flow import Flow
 from ..mechanics.tension import components_along, filament_tensions
-from ..units.quantities import FORCE, LENGTH, STIFFNESS, in_units_of, positive, shown, vector, whole_number
+from ..units.quantities import (
+    FORCE,
+    LENGTH,
+    STIFFNESS,
+    in_units_of,
+    positive,
+    vector,
+    whole_number,
+    whole_numbers,
+)
 from ..units.types import Indices, Scalar, Vector, Vectors
 
 
@@ -259,8 +267,7 @@ class FilamentsInContext:
         points : (tethers, 3) length
         """
         points = np.asarray(in_units_of(points, LENGTH, "points"))
-        if not isinstance(tethers, (Sequence, np.ndarray)) or np.ndim(tethers) != 1:
-            raise InputError(f"tethers must be a sequence of numbers of tethers, but is {shown(tethers)}.")
+        tethers = whole_numbers(tethers, 0, "tethers")
         if points.shape != (len(tethers), 3):
             raise InputError(f"points must have the shape ({len(tethers)}, 3), but have {points.shape}.")
         old = self.tethers()
@@ -276,11 +283,8 @@ class FilamentsInContext:
         positions = state.getPositions(asNumpy=True)._value
         box = state.getPeriodicBoxVectors(asNumpy=True)._value if force.usesPeriodicBoundaryConditions() else None
         table, curves = self.linkers(), BeamCurves.of_system(self._context.getSystem())
-        filaments, monomers = self._placed.filaments, None
-        if any(filament.growth is not None for filament in filaments):
-            growth = self.growth()
-            monomers = dict(zip(growth.filaments.tolist(), growth.monomers))
-        return force, table, filaments, self._placed.node_indices, positions, box, curves, monomers
+        contours = contours_in(self._context, self._placed.filaments)
+        return force, table, contours, self._placed.node_indices, positions, box, curves
 
     def _binding_force(self):
         force = find_binding_force(self._context.getSystem())

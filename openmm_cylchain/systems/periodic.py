@@ -19,8 +19,9 @@ from openmm import unit
 
 from ..engines.description import filament_label
 from ..errors import InputError
+from ..filaments.collection import require_filaments
 from ..filaments.grown import longest_segment
-from ..filaments.topology_nodes import filament_nodes
+from ..filaments.topology_nodes import filament_nodes, require_trajectory
 from ..units.quantities import LENGTH, in_units_of
 from ..units.types import BoxVectors, Vectors
 from .filaments import Filaments
@@ -57,8 +58,7 @@ def make_whole(positions: Vectors, filaments: Filaments, box_vectors: BoxVectors
     --------
     >>> context.setPositions(make_whole(positions, filaments, box_vectors))  # doctest: +SKIP
     """
-    if not isinstance(filaments, Filaments):
-        raise InputError(f"filaments must be a Filaments object, but is {filaments!r}.")
+    require_filaments(filaments)
     given = np.asarray(in_units_of(positions, LENGTH, "positions"))
     own = [*filaments.node_indices, *filaments.control_point_indices, filaments.attachment_indices]
     last = int(np.concatenate(own).max())
@@ -105,6 +105,7 @@ def make_trajectory_whole(trajectory: mdtraj.Trajectory) -> mdtraj.Trajectory:
     InputError
         If the trajectory has no box or no filaments, or a segment is at least half as long as the box is wide.
     """
+    require_trajectory(trajectory)
     nodes_of = filament_nodes(trajectory)
     vectors = _trajectory_lattice(trajectory)
     positions = trajectory.xyz.astype(float)

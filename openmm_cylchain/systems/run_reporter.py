@@ -15,6 +15,7 @@ from ..couplings.mean_forces import ForceReaders
 from ..couplings.periodicity import is_periodic
 from ..couplings.shapes import Shape
 from ..errors import InputError
+from ..output.files import as_path
 from ..output.linker_records import LinkerFile, measure_linkers
 from ..output.record_file import read_records
 from ..output.run_files import RunFiles
@@ -24,7 +25,16 @@ from ..output.run_tables import (
     size_of_lines,
     start_of_trajectory,
 )
-from ..units.quantities import LENGTH, positive, thermal_energy, whole_number
+from ..units.quantities import (
+    LARGEST_INT,
+    LENGTH,
+    positive,
+    require_kind,
+    shown,
+    thermal_energy,
+    true_or_false,
+    whole_number,
+)
 from ..units.types import Scalar
 from .described_runs import (
     describe_system,
@@ -93,22 +103,28 @@ class RunReporter:
         particle_diameters: Mapping[str, Scalar] | None = None,
     ) -> None:
         self._closed = True
-        self._interval = whole_number(reportInterval, 1, "reportInterval")
+        self._interval = whole_number(reportInterval, 1, "reportInterval", LARGEST_INT)
         if not isinstance(filaments, Filaments):
             raise InputError(f"filaments must be a Filaments object, but is {type(filaments).__name__}.")
+        if not isinstance(walls, Sequence) or isinstance(walls, str):
+            raise InputError(f"walls must be a sequence of Shapes such as Sphere, but is {shown(walls)}.")
         for shape in walls:
             if not isinstance(shape, Shape):
-                raise InputError(f"walls must be Shapes such as Sphere, but one is {shape!r}.")
-        if not isinstance(directory, (str, Path)):
-            raise InputError(f"directory must be a path, but is {directory!r}.")
-        self._filaments, self._title, self._walls = filaments, str(title), tuple(walls)
+                raise InputError(f"walls must be Shapes such as Sphere, but one is {shown(shape)}.")
+        as_path(directory, "directory")
+        require_kind(title, str, "title")
+        self._filaments, self._title, self._walls = filaments, title, tuple(walls)
         self._kT = thermal_energy(filaments.temperature)
-        self._append = bool(append)
-        if not isinstance(particle_diameters or {}, Mapping):
-            raise InputError("particle_diameters must have lengths by names of residues, such as {'PRT': 5.0}.")
+        self._append = append = true_or_false(append, "append")
+        particle_diameters = {} if particle_diameters is None else particle_diameters
+        if not isinstance(particle_diameters, Mapping) or not all(isinstance(name, str) for name in particle_diameters):
+            raise InputError(
+                "particle_diameters must have lengths by names of residues, such as {'PRT': 5.0}, but is "
+                f"{shown(particle_diameters)}."
+            )
         self._diameters = {
-            str(name): positive(diameter, LENGTH, f"the diameter of {name!r}")
-            for name, diameter in (particle_diameters or {}).items()
+            name: positive(diameter, LENGTH, f"particle_diameters: the diameter of {name!r}")
+            for name, diameter in particle_diameters.items()
         }
         self._files = RunFiles(directory)
         self._open: list[Any] = []

@@ -42,13 +42,27 @@ import openmm
 
 from ..engine_choice import default_scheme
 from ..errors import InputError, InstabilityError
+from ..filaments.collection import require_filaments
 from ..filaments.growth_refusals import refuse_growth
+from ..filaments.placement import refuse_coinciding
 from ..kinetics.binding_force import find_binding_force
 from ..mechanics.flow import Flow
+from ..mechanics.geometry import segment_vectors
 from ..time_steps.recommended_step import recommended_time_step
 from ..time_steps.schemes import check_scheme
 from ..time_steps.time_step import TimeStep, as_step
-from ..units.quantities import DIMENSIONLESS, positive, thermal_energy, whole_number
+from ..units.quantities import (
+    DIMENSIONLESS,
+    LENGTH,
+    in_units_of,
+    positive,
+    require_callable,
+    require_kind,
+    shown,
+    thermal_energy,
+    true_or_false,
+    whole_number,
+)
 from ..units.text import format_time
 from ..units.types import Numbers, Scalar, Vectors
 from .filaments import Filaments
@@ -141,7 +155,22 @@ def check_time_step(
     InputError
         At a temperature of zero, for filaments that grow, or as ``Filaments.create_integrator``.
     """
+    require_filaments(filaments)
     refuse_growth(filaments, "the check of a step, which compares the same nodes in two runs,")
+    require_kind(system, openmm.System, "system")
+    positions = np.asarray(in_units_of(positions, LENGTH, "positions"))
+    if positions.shape != (system.getNumParticles(), 3):
+        raise InputError(
+            f"positions must have the shape ({system.getNumParticles()}, 3) of the System's particles, but have "
+            f"{positions.shape}."
+        )
+    for number, (filament, nodes) in enumerate(zip(filaments, filaments.node_indices)):
+        apart = np.linalg.norm(segment_vectors(positions[nodes], filament.closed), axis=1)
+        refuse_coinciding(apart, len(nodes), f"positions: filament {number}")
+    equilibrium = true_or_false(equilibrium, "equilibrium")
+    require_callable(say, "say")
+    require_callable(stop, "stop")
+    _check_platform(platform, properties)
     step = as_step(step_size)
     scheme = default_scheme(filaments.engine) if scheme is None else scheme
     check_scheme(scheme)
@@ -201,6 +230,17 @@ def check_time_step(
         relaxation=relaxation,
         strained=strained,
     )
+
+
+def _check_platform(platform, properties):
+    if platform is not None:
+        require_kind(platform, openmm.Platform, "platform")
+    if properties is not None:
+        require_kind(properties, Mapping, "properties")
+        if any(not isinstance(one, str) for pair in properties.items() for one in pair):
+            raise InputError(f"properties must be texts by names of properties, but are {shown(properties)}.")
+        if platform is None and properties:
+            raise InputError("properties are those of a platform: give the platform, too.")
 
 
 class _Pair:
@@ -290,7 +330,7 @@ class _Run:
             )
         if paired:
             self._integrator.setPathLevel(level)
-        arguments = () if platform is None else (platform, properties or {})
+        arguments = () if platform is None else (platform, dict(properties or {}))
         try:
             self.context = openmm.Context(self._system, self._integrator, *arguments)
         except openmm.OpenMMException as error:

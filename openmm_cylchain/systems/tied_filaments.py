@@ -15,7 +15,7 @@ from ..filaments.placement import named_nodes
 from ..filaments.segment_place import SegmentPlace
 from ..kinetics.crosslinker import Crosslinker
 from ..kinetics.linkers import Linkers, as_linkers, warn_if_springs_do_not_fit
-from ..units.quantities import LENGTH, STIFFNESS, positive, vector, whole_number
+from ..units.quantities import LENGTH, STIFFNESS, positive, shown, vector, whole_number
 from ..units.types import Indices, IntArray, Scalar, Vector, Vectors
 from .added_filaments import AddedFilaments
 
@@ -185,7 +185,7 @@ class TiedFilaments(AddedFilaments):
         InputError
             For a filament that does not exist, grows or has beads already, or a spacing that is not positive.
         """
-        label = f"Beads of filament {filament}"
+        label = f"Beads of filament {shown(filament)}"
         self._refuse_if_built(label)
         filament = self._lasting_filament(
             filament, label, "beads", "capsule_contact_force and filament_wall_force need none."

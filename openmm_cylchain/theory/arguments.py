@@ -7,7 +7,16 @@ from openmm import unit
 from ..errors import InputError
 from ..filaments.chain_type import ChainType
 from ..filaments.straight_segments import STRAIGHT_SEGMENTS
-from ..units.quantities import DIMENSIONLESS, TEMPERATURE, in_units_of, positive, require_kind, shown, thermal_energy
+from ..units.quantities import (
+    DIMENSIONLESS,
+    TEMPERATURE,
+    in_units_of,
+    positive,
+    require_kind,
+    shown,
+    thermal_energy,
+    whole_number,
+)
 from ..units.types import FloatOrArray, Numbers, Scalar
 
 
@@ -29,6 +38,14 @@ def each_not_negative(value: Numbers, dimension: unit.Unit, name: str) -> FloatO
     number = in_units_of(value, dimension, name)
     if np.any(np.asarray(number) < 0):
         raise InputError(f"{name} cannot be negative.")
+    return number
+
+
+def number_in_memory(value: int, minimum: int, name: str, most: int = 10**7) -> int:
+    """A number of segments of which arrays are made; InputError if it is none, or more than can be computed."""
+    number = whole_number(value, minimum, name)
+    if number > most:
+        raise InputError(f"{name} must be at most {most:.0e}, but is {number:.3g}.")
     return number
 
 

@@ -9,17 +9,28 @@ import numpy as np
 import numpy.typing as npt
 
 from ..beams.equilibrium import ElementAverages, element_averages
+from ..errors import InputError
+from ..filaments.chain_type import ChainType
 from ..filaments.filament_type import FilamentType
-from ..units.quantities import whole_number
+from ..units.quantities import require_kind
 from ..units.types import FloatOrArray, Scalar
-from .arguments import each_whole_number, thermal_energy_above_zero
+from .arguments import each_whole_number, number_in_memory, thermal_energy_above_zero
+
+_LONGEST = 10.0
 
 
 def beam_averages(filament_type: FilamentType, temperature: Scalar, planar: bool = False) -> ElementAverages:
     """Those of an element with stiff lengths: see ``ElementAverages``."""
+    require_kind(filament_type, ChainType, "filament_type")
     kT = thermal_energy_above_zero(temperature)
     element = filament_type.beam_element(temperature, planar)
-    return element_averages(element.length * kT / element.rigidity, bool(planar))
+    bend = element.length * kT / element.rigidity
+    if bend > _LONGEST:
+        raise InputError(
+            f"Filament type {filament_type.name!r}: an element is {bend:.3g} persistence lengths long at this "
+            f"temperature, and averages are those of up to {_LONGEST:g}: take a shorter segment_length."
+        )
+    return element_averages(bend, bool(planar))
 
 
 def beam_tangent_correlation(
@@ -81,7 +92,7 @@ def beam_mean_square_end_to_end(
     InputError
         If segments are straight, or the number or the temperature is none.
     """
-    elements = whole_number(elements, 1, "elements")
+    elements = number_in_memory(elements, 1, "elements")
     own = beam_averages(filament_type, temperature, planar)
     apart = np.arange(1, elements)
     pairs = 2.0 * own.chord_along**2 * np.sum((elements - apart) * own.cosine ** (apart - 1))
@@ -121,9 +132,10 @@ def beam_stretching_energy_mean(
     InputError
         If segments are straight, or the number or the temperature is none.
     """
-    elements = whole_number(elements, 1, "elements")
+    require_kind(filament_type, ChainType, "filament_type")
+    elements = number_in_memory(elements, 1, "elements")
     kT = thermal_energy_above_zero(temperature)
-    element = filament_type.beam_element(temperature)
+    element = filament_type.beam_element(temperature, planar)
     shares = np.full(elements + 1, 1.0 / 3.0)
     shares[[0, -1]] = 1.0 / 6.0
     of_nodes, of_middles = _SECOND_IN_A_PLANE if planar else _SECOND_IN_SPACE

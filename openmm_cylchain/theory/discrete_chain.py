@@ -23,9 +23,9 @@ from ..filaments.chain_type import ChainType, SegmentKind
 from ..filaments.equilibrium import JointAngleDistribution, PlanarJointAngleDistribution, SegmentLengthDistribution
 from ..filaments.filament_type import FilamentType
 from ..filaments.straight_segments import STRAIGHT_SEGMENTS
-from ..units.quantities import whole_number
+from ..units.quantities import require_kind, shown, true_or_false, whole_number
 from ..units.types import FloatOrArray, Scalar
-from .arguments import each_whole_number, require_straight_segments
+from .arguments import each_whole_number, number_in_memory, require_straight_segments, thermal_energy_above_zero
 from .beam_elements import (
     beam_bending_energy_mean,
     beam_mean_square_end_to_end,
@@ -39,7 +39,7 @@ from .energies import bending_energy_mean, stretching_energy_mean
 def mean_joint_cosine(filament_type: FilamentType, temperature: Scalar, planar: bool = False) -> float:
     """Mean cosine <t1.t2> between neighbouring segments of the free discrete chain, in space or in a plane; exact."""
     require_straight_segments(filament_type)
-    if planar:
+    if true_or_false(planar, "planar"):
         return float(PlanarJointAngleDistribution(filament_type, temperature).mean(np.cos))
     return float(JointAngleDistribution(filament_type, temperature).mean(lambda cosine: cosine))
 
@@ -84,6 +84,8 @@ def chain_persistence_length(
 
 
 def _persistence_length(filament_type, temperature, planar):
+    planar = true_or_false(planar, "planar")
+    thermal_energy_above_zero(temperature)
     if filament_type.joint_stiffness == 0:
         return 0.0
     length = SegmentLengthDistribution(filament_type, temperature, planar).mean(lambda length: length)
@@ -125,7 +127,7 @@ def chain_mean_square_end_to_end(
 
 
 def _mean_square_end_to_end(filament_type, segments, temperature, planar):
-    segments = whole_number(segments, 1, "segments")
+    segments = number_in_memory(segments, 1, "segments")
     return float(_subchain_mean_square(filament_type, segments, temperature, planar)[-1])
 
 
@@ -140,7 +142,7 @@ def chain_mean_square_radius_of_gyration(
 
 
 def _mean_square_radius_of_gyration(filament_type, segments, temperature, planar):
-    segments = whole_number(segments, 1, "segments")
+    segments = number_in_memory(segments, 1, "segments")
     distances = _subchain_mean_square(filament_type, segments, temperature, planar)
     return float(np.arange(segments, 0, -1) @ distances) / (segments + 1) ** 2
 
@@ -164,6 +166,7 @@ def chain_mean_energies(
 
 
 def _mean_energies(filament_type, segments, temperature, planar):
+    whole_number(segments, 1, "segments")
     bending = bending_energy_mean(filament_type, temperature, planar)
     return stretching_energy_mean(filament_type, temperature, planar), bending
 
@@ -198,7 +201,8 @@ def chain_bending_mode_variance(
     temperature : temperature, above zero
     """
     require_straight_segments(filament_type)
-    segments, modes = _bending_modes(segments, mode)
+    # All pairs of segments are in memory.
+    segments, modes = _bending_modes(number_in_memory(segments, 2, "segments", 10**4), mode)
     cosines = np.cos(np.multiply.outer(modes, np.pi * (np.arange(segments) + 0.5) / segments))
     lag = np.abs(np.subtract.outer(np.arange(segments), np.arange(segments)))
     bend = JointAngleDistribution(filament_type, temperature).mean(lambda cosine: 1.0 - cosine)
@@ -238,7 +242,7 @@ def _bending_modes(segments, mode):
     segments = whole_number(segments, 2, "segments")
     modes = each_whole_number(mode, 1, "mode")
     if np.any(np.asarray(modes) >= segments):
-        raise InputError(f"mode must be below the number of segments, {segments}, but is {mode!r}.")
+        raise InputError(f"mode must be below the number of segments, {segments}, but is {shown(mode)}.")
     return segments, modes
 
 
@@ -270,4 +274,5 @@ _AVERAGES: dict[SegmentKind, _Averages] = {
 
 
 def _averages(filament_type: ChainType) -> _Averages:
+    require_kind(filament_type, ChainType, "filament_type")
     return _AVERAGES[filament_type.segment_kind]

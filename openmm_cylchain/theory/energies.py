@@ -7,6 +7,7 @@ import scipy
 
 from ..filaments.equilibrium import PlanarJointAngleDistribution, SegmentLengthDistribution
 from ..filaments.filament_type import FilamentType
+from ..units.quantities import true_or_false
 from ..units.types import Scalar
 from .arguments import require_straight_segments, thermal_energy_above_zero
 
@@ -28,7 +29,7 @@ def bending_energy_mean(filament_type: FilamentType, temperature: Scalar, planar
     """
     require_straight_segments(filament_type)
     kT = thermal_energy_above_zero(temperature)
-    if planar:
+    if true_or_false(planar, "planar"):
         distribution = PlanarJointAngleDistribution(filament_type, temperature)
         return float(distribution.mean(lambda angle: filament_type.bending_energy(np.cos(angle))))
     return kT * _reduced_bending_moments(filament_type, kT)[0]
@@ -118,7 +119,7 @@ def stretching_energy_mean(filament_type: FilamentType, temperature: Scalar, pla
         In a plane.
     """
     require_straight_segments(filament_type)
-    if planar:
+    if true_or_false(planar, "planar"):
         return float(
             SegmentLengthDistribution(filament_type, temperature, planar).mean(filament_type.stretching_energy)
         )

@@ -11,9 +11,13 @@ import scipy
 from ..errors import InputError
 from ..filaments.equilibrium import JointAngleDistribution
 from ..filaments.filament_type import FilamentType
+from ..mechanics.quadrature import gauss_points
 from ..units.quantities import DIMENSIONLESS, FORCE, LENGTH, PICONEWTON, STIFFNESS, in_units_of, positive, whole_number
 from ..units.types import FloatOrArray, Numbers, Scalar
-from .arguments import each_not_negative, require_straight_segments, thermal_energy_above_zero
+from .arguments import each_not_negative, number_in_memory, require_straight_segments, thermal_energy_above_zero
+
+_MOST_DIRECTIONS = 1500
+"""In which segments are looked at: matrices of so many rows are inverted within seconds."""
 
 
 def marko_siggia_force(relative_extension: Numbers, persistence_length: Scalar, temperature: Scalar) -> FloatOrArray:
@@ -80,7 +84,8 @@ def chain_extension(filament_type: FilamentType, segments: int, force: Numbers, 
     temperature : temperature, above zero
     """
     require_straight_segments(filament_type)
-    segments = whole_number(segments, 1, "segments")
+    # One product after another: of longer chains, N times ``long_chain_extension`` is as good.
+    segments = number_in_memory(segments, 1, "segments", 10**5)
     kT = thermal_energy_above_zero(temperature)
     forces = np.asarray(each_not_negative(force, FORCE, "force")) / kT
     bending = _bending_transfer(filament_type, temperature, float(np.max(forces, initial=0.0)))
@@ -96,16 +101,12 @@ def _bending_transfer(filament_type, temperature, force):
     if filament_type.joint_stiffness > 0.0:
         # The n-th coefficient falls off as exp(-n^2/2s) for a joint of stiffness s k_B T.
         bend = cosines.mean(lambda cosine: 1.0 - cosine)
-        order = max(order, int(9.0 / math.sqrt(bend)))
+        order = max(order, math.ceil(min(9.0 / math.sqrt(bend), _MOST_DIRECTIONS)))
     node, weight = _cosine_nodes(2 * order, force * filament_type.segment_length)
     if filament_type.joint_stiffness == 0.0:
         return node, weight, np.full((len(node), len(node)), 0.5)
-    coefficients = [
-        cosines.mean(lambda cosine, n=n: np.polynomial.legendre.legval(cosine, np.eye(1, n + 1, n)[0]))  # type: ignore[misc]
-        for n in range(order)
-    ]
     polynomials = np.polynomial.legendre.legvander(node, order - 1)
-    scale = (np.arange(order) + 0.5) * np.array(coefficients)
+    scale = (np.arange(order) + 0.5) * cosines.legendre_means(order)
     return node, weight, (polynomials * scale) @ polynomials.T
 
 
@@ -113,9 +114,13 @@ def _cosine_nodes(least, alignment):
     # For exp(u c) with u up to ``alignment``: in s of c = 1 - 2 s^2 it is a Gaussian of the width (4 u)^-1/2, which the
     # nodes, the denser the nearer to s = 0, divide into several parts.
     points = max(least, int(30.0 * (1.0 + alignment) ** 0.25))
-    gauss, gauss_weight = np.polynomial.legendre.leggauss(points)
-    root = 0.5 * (gauss + 1.0)
-    return 1.0 - 2.0 * root**2, 2.0 * root * gauss_weight
+    if points > _MOST_DIRECTIONS:
+        raise InputError(
+            "Segments are too stiff or too strongly aligned for this sum over their directions: take a smaller force, "
+            "a higher temperature or longer segments."
+        )
+    root, weight = gauss_points(points)
+    return 1.0 - 2.0 * root**2, 4.0 * root * weight
 
 
 def _pulled_lengths(filament_type, force, kT, node):
@@ -125,9 +130,9 @@ def _pulled_lengths(filament_type, force, kT, node):
     low, high = rest - 12.0 * width, rest + 12.0 * width + force * width**2 + 2.0 * width**2 / rest
     if filament_type.maximum_extension is not None:
         low, high = (rest + sign * filament_type.maximum_extension * (1.0 - 1e-12) for sign in (-1.0, 1.0))
-    gauss, gauss_weight = np.polynomial.legendre.leggauss(200)
+    place, gauss_weight = gauss_points(200)
     low = max(low, 0.0)
-    length = low + 0.5 * (high - low) * (gauss + 1.0)
+    length = low + (high - low) * place
     with np.errstate(divide="ignore"):
         exponent = 2.0 * np.log(length) - filament_type.stretching_energy(length) / kT + np.outer(node, force * length)
     density = gauss_weight * np.exp(exponent - exponent.max())
@@ -204,7 +209,10 @@ def wlc_relative_extension(
 
     def extension(each):
         # The state has the width (k_B T/lp F)^(1/4) in angle.
-        order = np.arange(int(40 + 12.0 * (each * (1.0 + each * softness) * length / kT) ** 0.25))
+        width = (each * (1.0 + each * softness) * length / kT) ** 0.25
+        if 40 + 12.0 * width > _MOST_DIRECTIONS:
+            raise InputError(f"force is {each:g} kJ/(mol nm), too strong for this sum: take a smaller one.")
+        order = np.arange(int(40 + 12.0 * width))
         beside = order[1:] / np.sqrt(4.0 * order[1:] ** 2 - 1.0)
         cosine = np.diag(beside, 1) + np.diag(beside, -1)
         square = cosine @ cosine

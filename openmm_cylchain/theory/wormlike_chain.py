@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from ..units.quantities import LENGTH, positive
+from ..units.quantities import LENGTH, positive, true_or_false
 from ..units.types import FloatOrArray, Numbers, Scalar
 from .arguments import each_not_negative, each_whole_number
 
@@ -40,7 +40,8 @@ def wlc_mean_square_end_to_end(
 
 def _correlation_length(persistence_length, planar):
     # A tangent has one direction to turn to in a plane, two in space.
-    return (2.0 if planar else 1.0) * positive(persistence_length, LENGTH, "persistence_length")
+    directions = 1.0 if true_or_false(planar, "planar") else 2.0
+    return 2.0 / directions * positive(persistence_length, LENGTH, "persistence_length")
 
 
 def wlc_tangent_correlation(

@@ -70,12 +70,12 @@ def warn_if_growth_is_not_resolved(filaments: FilamentCollection, system: openmm
 def refuse_countless_monomers(filaments: Iterable[Filament], step: float) -> None:
     """Raise InputError if a filament gains and loses more than 100000 monomers in a step, in ps."""
     for number, filament in enumerate(filaments):
-        rate = sum(sum(_rates(filament, end)) for end in ("minus", "plus"))
+        rate = sum(_events(filament, end) for end in ("minus", "plus"))
         if step * rate > _MOST_EVENTS:
             raise InputError(
                 f"Filament {number} ({filament.type.name}) gains and loses {_PER_SECOND * rate:.3g} monomers per "
-                f"second, {step * rate:.3g} in a time step of {format_time(step, 4)}: check the units of its rates and "
-                "of its pool."
+                f"second, or turns so often, {step * rate:.3g} times in a time step of {format_time(step, 4)}: check the units "
+                "of its rates and of its pool."
             )
 
 
@@ -91,6 +91,17 @@ def _fastest_end(filaments, system):
 
 def _may_be_pushed(force):
     return as_filament_wall_force(force) is not None or as_capsule_contact_force(force) is not None
+
+
+def _events(filament, end):
+    # How many come to an end in 1/ps while it grows, or while it shrinks if that is more.
+    on_rate, off_rate = _rates(filament, end)
+    instability = None if filament.growth is None else filament.growth.instability(end)
+    if instability is None:
+        return on_rate + off_rate
+    back_rate, loss_rate, catastrophe_rate, rescue_rate = instability.rates
+    shrinking = back_rate * filament.growth.pool.concentration + loss_rate + rescue_rate
+    return max(on_rate + off_rate + catastrophe_rate, shrinking)
 
 
 def _rates(filament, end):

@@ -13,6 +13,7 @@ from ..units.quantities import (
     DIMENSIONLESS,
     ENERGY,
     LENGTH,
+    VISCOSITY,
     finite_number,
     positive,
     require_kind,
@@ -112,6 +113,8 @@ def recommended_time_step(
     propulsion = finite_number(propulsion, ENERGY / LENGTH, "propulsion")
     if friction is not None:
         require_kind(friction, SegmentFriction, "friction")
+    positive(viscosity, VISCOSITY, "viscosity")
+    thermal_energy(temperature)
     if isinstance(filament_type, BeadSpringType):
         return bead_spring_time_step(filament_type, scheme, segments, closed, flow)
     if scheme == MODES:
@@ -214,6 +217,13 @@ def fene_steps(filament_type: ChainType, friction: SegmentFriction, temperature:
     step is right to 3 %, and both are infinite and zero then. (DNA segments of 8 nm with D from 0.01 to 7.9 nm, nu from
     0.01 to 100 and steps from 26 ps to 2.6 ns; F-actin with D from 0.1 to 36 nm at 0.4 ms.)
     """
+    require_kind(filament_type, ChainType, "filament_type")
+    require_kind(friction, SegmentFriction, "friction")
+    if filament_type.stretching_model != "fene":
+        raise InputError(
+            f"Filament type {filament_type.name!r} has the stretching_model {filament_type.stretching_model!r}: "
+            "fene_steps are those of 'fene', with a maximum_extension."
+        )
     kT = thermal_energy(temperature)
     stiffness, extension = filament_type.segment_stiffness, cast(float, filament_type.maximum_extension)
     length = filament_type.segment_length

@@ -19,6 +19,7 @@ from ..units.quantities import (
     VISCOSITY,
     in_units_of,
     positive,
+    require_kind,
     thermal_energy,
 )
 from ..units.types import Scalar
@@ -165,6 +166,7 @@ def time_step_bounds(
     dict
         ``translation`` (54), ``rotation`` (55), ``diffusion`` (56), ``stretching`` (57), ``bending`` (58).
     """
+    require_kind(filament_type, ChainType, "filament_type")
     if isinstance(filament_type, BeadSpringType):
         raise InputError(f"Table 1 has bounds of cylinders, but {filament_type.name!r} has beads: see stability_bounds")
     friction = filament_type.segment_friction(viscosity, temperature, segments)
@@ -185,9 +187,10 @@ def stability_bounds(
 
     Of beads one alone, ``springs``, see ``bead_spring_step.bead_spring_stability_bound``.
     """
+    require_kind(filament_type, ChainType, "filament_type")
+    friction = filament_type.segment_friction(viscosity, temperature, segments)
     if isinstance(filament_type, BeadSpringType):
         return {"springs": bead_spring_stability_bound(filament_type)}
-    friction = filament_type.segment_friction(viscosity, temperature, segments)
     return bounds_of_chain(filament_type, friction, segments)
 
 

@@ -9,7 +9,7 @@ import scipy
 
 from ..errors import InputError
 from ..mechanics.flow import Flow
-from ..units.quantities import DIMENSIONLESS, TIME, non_negative, positive
+from ..units.quantities import DIMENSIONLESS, TIME, non_negative, positive, require_kind, shown
 from ..units.text import format_time
 from ..units.types import Scalar
 from .schemes import amplification_of_second_order, check_scheme
@@ -53,6 +53,19 @@ class TimeStep:
     unknown_forces: tuple[str, ...] = ()
     dynamics: tuple[tuple[str, float], ...] = ()
 
+    def __post_init__(self) -> None:
+        # Infinite where nothing bounds it.
+        if not (isinstance(self.step, float) and self.step == math.inf):
+            object.__setattr__(self, "step", positive(self.step, TIME, "TimeStep: step"))
+        require_kind(self.reason, str, "TimeStep: reason")
+        for name, kind in (("bounds", dict), ("allowed", dict), ("unknown_forces", tuple), ("dynamics", tuple)):
+            require_kind(getattr(self, name), kind, f"TimeStep: {name}")
+        for force in self.unknown_forces:
+            require_kind(force, str, "TimeStep: one of unknown_forces")
+        for pair in self.dynamics:
+            if not (isinstance(pair, tuple) and len(pair) == 2):
+                raise InputError(f"TimeStep: dynamics must be pairs of a scheme and a rate, but one is {shown(pair)}.")
+
     def resolved_relaxation_time(self, error: float = 0.05) -> float:
         """The shortest relaxation time, in ps, of a mode of bending whose rate is right within ``error`` at the step.
 
@@ -75,7 +88,7 @@ class TimeStep:
 
 def as_step(step: Scalar | TimeStep, name: str = "step_size") -> float:
     """A time step in ps: of a TimeStep, or of a quantity or plain number that must be positive."""
-    return step.step if isinstance(step, TimeStep) else positive(step, TIME, name)
+    return positive(step.step if isinstance(step, TimeStep) else step, TIME, name)
 
 
 def shortest(steps: Iterable[TimeStep]) -> TimeStep:

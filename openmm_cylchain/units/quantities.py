@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import reprlib
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,9 @@ _LARGEST = 1e60
 """Powers of what is beyond, or below its inverse, are not finite."""
 
 _LARGEST_WHOLE = 2**63 - 1
+LARGEST_INT = 2**31 - 1
+"""Of whole numbers that OpenMM and files keep in 32 bits."""
+
 _SHOWN_NUMBERS = 16
 _short = reprlib.Repr()
 _short.maxstring = _short.maxother = 160
@@ -54,8 +57,11 @@ def in_units_of(value: Numbers, target: unit.Unit, name: str) -> FloatOrArray:
 
     A plain number or array is taken to be in ``target`` already. A quantity is converted; one per particle
     (pN/nm, Pa s) is turned into one per mole (kJ/mol/nm^2) where ``target`` is molar. InputError if the value is not a
-    number, not finite, or has the dimension of something else.
+    number, not finite, beyond what can be computed with, or has the dimension of something else.
     """
+    # By far the most frequent, and this is asked of every filament that is added.
+    if isinstance(value, float) and abs(value) <= _LARGEST:
+        return float(value)
     if not isinstance(value, unit.Quantity) and isinstance(value, (list, tuple)):
         if any(isinstance(item, unit.Quantity) for item in value):
             value = np.array([in_units_of(item, target, name) for item in value])
@@ -68,9 +74,29 @@ def in_units_of(value: Numbers, target: unit.Unit, name: str) -> FloatOrArray:
     if array.dtype.kind not in "iuf" and array.size:
         raise InputError(f"{name} must be a number or an array of numbers, but is {shown(value)}.")
     array = array.astype(float)
-    if not np.all(np.isfinite(array)):
-        raise InputError(f"{name} must be finite, but contains NaN or infinity.")
+    largest = np.max(np.abs(array), initial=0.0)
+    if not largest <= _LARGEST:
+        if not np.isfinite(largest):
+            raise InputError(f"{name} must be finite, but contains NaN or infinity.")
+        raise _beyond_all_measure(name, largest)
     return float(array) if array.ndim == 0 else array
+
+
+def numbers_to_compute_with(value: Numbers, target: unit.Unit, name: str, components: int = 0) -> FloatArray:
+    """Return ``value`` as a float array in ``target``, as ``in_units_of`` does, but with NaN where it is NaN.
+
+    InputError if infinite, or unless it has so many components along its last axis, if any are given.
+    """
+    if isinstance(value, unit.Quantity):
+        value = _converted(value, target, name)
+    array = np.asarray(value) if isinstance(value, np.ndarray) and value.dtype.kind == "f" else None
+    if array is None:
+        array = np.asarray(in_units_of(value, target, name))
+    elif np.max(np.abs(array), initial=0.0, where=~np.isnan(array)) > _LARGEST:
+        raise InputError(f"{name} must be below {_LARGEST:g} in OpenMM's units.")
+    if components and (array.ndim < 2 or array.shape[-1] != components):
+        raise InputError(f"{name} must have the shape (..., {components}), but has {array.shape}.")
+    return array
 
 
 def shown(value: Any) -> str:
@@ -120,30 +146,45 @@ def _single_number(value, target, name):
 
 
 def _of_size(number, name):
-    if number != 0.0 and not 1.0 / _LARGEST <= abs(number) <= _LARGEST:
-        raise InputError(
-            f"{name} must be between {1.0 / _LARGEST:g} and {_LARGEST:g} in OpenMM's units, but is {number:g}."
-        )
+    if number != 0.0 and abs(number) < 1.0 / _LARGEST:
+        raise _beyond_all_measure(name, number)
     return number
 
 
-def whole_number(value: Any, minimum: int, name: str) -> int:
-    """Return ``value`` as an int; raise InputError unless it is a whole number of at least ``minimum``."""
+def _beyond_all_measure(name, number):
+    return InputError(
+        f"{name} must be between {1.0 / _LARGEST:g} and {_LARGEST:g} in OpenMM's units, but is {number:g}."
+    )
+
+
+def whole_number(value: Any, minimum: int, name: str, maximum: int = _LARGEST_WHOLE) -> int:
+    """Return ``value`` as an int; raise InputError unless it is a whole number from ``minimum`` to ``maximum``."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
         if not (isinstance(value, float) and math.isfinite(value) and value == int(value)):
             raise InputError(f"{name} must be a whole number, but is {shown(value)}.")
     if value < minimum:
         raise InputError(f"{name} must be at least {minimum}, but is {shown(value)}.")
-    if value > _LARGEST_WHOLE:
-        raise InputError(f"{name} must be at most {_LARGEST_WHOLE}, but is {shown(value)}.")
+    if value > maximum:
+        raise InputError(f"{name} must be at most {maximum}, but is {shown(value)}.")
     return int(value)
 
 
 def whole_numbers(values: Any, minimum: int, name: str) -> list[int]:
     """Return a sequence of whole numbers as ints; raise InputError for anything else."""
-    if isinstance(values, (str, bytes)) or not isinstance(values, Collection) or getattr(values, "ndim", 1) == 0:
+    others = (str, bytes, Mapping, unit.Quantity)
+    if isinstance(values, others) or not isinstance(values, Collection) or getattr(values, "ndim", 1) == 0:
         raise InputError(f"{name} must be a sequence of whole numbers, but is {shown(values)}.")
     return [whole_number(value, minimum, f"An entry of {name}") for value in values]
+
+
+def numbers_of(values: Any, minimum: int, name: str) -> list[int]:
+    """Return a whole number, or a sequence of them, as a list of ints; raise InputError for anything else."""
+    alone = np.ndim(values) == 0 if isinstance(values, np.ndarray) else isinstance(values, (int, float, np.integer))
+    return (
+        [whole_number(getattr(values, "item", lambda: values)(), minimum, name)]
+        if alone
+        else whole_numbers(values, minimum, name)
+    )
 
 
 def true_or_false(value: Any, name: str) -> bool:
@@ -166,6 +207,12 @@ def require_kind(value: Any, kind: type, name: str) -> None:
         raise InputError(f"{name} must be an object of the class {kind.__name__}, but is {shown(value)}.")
 
 
+def require_callable(value: Any, name: str) -> None:
+    """Raise InputError unless ``value`` can be called."""
+    if not callable(value):
+        raise InputError(f"{name} must be a function, but is {shown(value)}.")
+
+
 def vector(value: Vector, target: unit.Unit, name: str) -> FloatArray:
     """Return ``value`` as a (3,) array in the unit ``target``; raise InputError if it has another shape."""
     components = np.asarray(in_units_of(value, target, name))
@@ -177,10 +224,12 @@ def vector(value: Vector, target: unit.Unit, name: str) -> FloatArray:
 def unit_vector(direction: Vector, label: str, name: str = "direction") -> FloatArray:
     """Return ``direction`` normalised; raise InputError if it is zero or not a vector."""
     direction = vector(direction, DIMENSIONLESS, f"{label}: {name}")
-    norm = np.linalg.norm(direction)
-    if norm == 0:
+    largest = np.max(np.abs(direction))
+    if largest == 0:
         raise InputError(f"{label}: {name} must not be the zero vector.")
-    return direction / norm
+    # Squares of small components would be zero.
+    direction = direction / largest if largest < 1.0 / _LARGEST else direction
+    return direction / np.linalg.norm(direction)
 
 
 def thermal_energy(temperature: Scalar) -> float:

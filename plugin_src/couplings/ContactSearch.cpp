@@ -82,7 +82,7 @@ void ContactSearch::Implementation::setFrame(const double* x, const double* y, c
     largestRadius = 0;
     for (const Capsule& capsule : system.capsules)
         largestRadius = max(largestRadius, capsule.radius);
-    if (frame.periodic) {
+    if (box != NULL) {
         copy(box, box+9, frame.vectors);
         if (box[1] != 0 || box[2] != 0 || box[5] != 0 || !(box[0] > 0 && box[4] > 0 && box[8] > 0))
             throw invalid_argument("The vectors of the periodic box are not in reduced form");

@@ -22,6 +22,8 @@ namespace {
 
 /** Chains share a pack if they use the same models and at most a fifth of a lane is filled up. */
 const double LARGEST_FILLING = 0.2;
+/** The same of chains that have grown since they were put there. */
+const double LARGEST_FILLING_OF_GROWN = 0.5;
 
 const ChainKernels& kernels() {
     static const ChainKernels& best = loopsOfBest<baselineKernels, avx2Kernels, avx512Kernels>();
@@ -34,8 +36,8 @@ bool hasSegmentFriction(const Chain& chain) {
     });
 }
 
-bool mayShareLanes(const Chain& longest, const Chain& chain) {
-    const size_t least = longest.closed ? longest.segments.size() : ceil((1-LARGEST_FILLING)*longest.segments.size());
+bool mayShareLanes(const Chain& longest, const Chain& chain, double filling = LARGEST_FILLING) {
+    const size_t least = longest.closed ? longest.segments.size() : ceil((1-filling)*longest.segments.size());
     return hasSegmentFriction(chain) == hasSegmentFriction(longest) &&
             (chain.nodeFriction > 0) == (longest.nodeFriction > 0) && chain.bending == longest.bending &&
             chain.stretching == longest.stretching && chain.closed == longest.closed &&
@@ -128,10 +130,12 @@ template <class From, class To> void copyLanes(const vector<From>& from, int lan
         copy_n(from.begin()+row*lanes, lanes, to.begin()+row*allLanes+firstLane);
 }
 
-/** Some packs, of which the first is the longest, as one in single precision. */
+/** Some packs as one in single precision, as long as the longest of them. */
 ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>* last, int lanes,
         PropertyTables<float>& tables) {
-    ChainPack<float> wide = packWithoutChains<float>(*first, lanes);
+    const ChainPack<double>* const longest = max_element(first, last,
+            [] (const ChainPack<double>& a, const ChainPack<double>& b) {return a.nodes < b.nodes;});
+    ChainPack<float> wide = packWithoutChains<float>(*longest, lanes);
     PropertyRows<float> properties(wide.nodes, lanes);
     int lane = 0;
     for (const ChainPack<double>* pack = first; pack != last; lane += pack->lanes, pack++) {
@@ -160,6 +164,13 @@ ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>
     properties.giveTo(wide, tables);
     sortTethers(wide);
     return wide;
+}
+
+/** The pieces of the chains of a pack that are few and long, or NULL. */
+unique_ptr<ChainPieces> piecesOf(const vector<Chain>& chains, const vector<int>& members) {
+    if (!ChainPieces::mayBeUsed(chains, members, kernels().wide.lanes))
+        return NULL;
+    return make_unique<ChainPieces>(chains, members, kernels().lanes, kernels().wide.lanes);
 }
 
 template <class Scalar> ParticleRange particlesOf(const ChainPack<Scalar>& pack) {
@@ -246,6 +257,8 @@ struct ChainEngine::Implementation {
     /** Packs are counted through all of these. Wide ones are in the order of those that they replace. */
     vector<ChainPack<double> > packs;
     vector<WidePack> wide;
+    /** The chains of each pack in double precision, the longest first. */
+    vector<vector<int> > members;
     PropertyTables<double> tables;
     PropertyTables<float> wideTables;
     ModePacks modes;
@@ -287,7 +300,7 @@ ChainEngine::ChainEngine(const vector<Chain>& chains, const vector<PieceOfChain>
         };
         return key(chains[a]) < key(chains[b]);
     });
-    vector<vector<int> > members;
+    vector<vector<int> >& members = implementation->members;
     for (size_t first = 0; first < order.size();) {
         int fitting = 1;
         while (fitting < kernels().lanes && first+fitting < order.size() &&
@@ -298,9 +311,7 @@ ChainEngine::ChainEngine(const vector<Chain>& chains, const vector<PieceOfChain>
                 lanesFor(fitting, kernels().lanes), implementation->tables));
         if (!origins.empty())
             setOrigins(implementation->packs.back(), origins);
-        const bool isLong = origins.empty() && ChainPieces::mayBeUsed(chains, members.back(), kernels().wide.lanes);
-        implementation->pieces.emplace_back(!isLong ? NULL :
-                new ChainPieces(chains, members.back(), kernels().lanes, kernels().wide.lanes));
+        implementation->pieces.push_back(origins.empty() ? piecesOf(chains, members.back()) : NULL);
         first += fitting;
     }
 
@@ -321,6 +332,42 @@ ChainEngine::ChainEngine(const vector<Chain>& chains, const vector<PieceOfChain>
 }
 
 ChainEngine::~ChainEngine() {
+}
+
+bool ChainEngine::replaceChains(const vector<Chain>& chains, const vector<int>& changed) {
+    vector<char> isChanged(chains.size(), 0);
+    for (int chain : changed)
+        isChanged[chain] = 1;
+    vector<vector<int> >& members = implementation->members;
+    vector<int> packs;
+    for (size_t pack = 0; pack < members.size(); pack++) {
+        vector<int>& own = members[pack];
+        if (none_of(own.begin(), own.end(), [&] (int chain) {return isChanged[chain] != 0;}))
+            continue;
+        stable_sort(own.begin(), own.end(), [&] (int a, int b) {
+            return chains[a].nodes.size() > chains[b].nodes.size();
+        });
+        if (!mayShareLanes(chains[own[0]], chains[own.back()], LARGEST_FILLING_OF_GROWN))
+            return false;
+        packs.push_back(pack);
+    }
+    // Tables of what has changed are its own, and those before are gone with it.
+    implementation->tables = PropertyTables<double>();
+    implementation->wideTables = PropertyTables<float>();
+    for (int pack : packs) {
+        implementation->packs[pack] = packed(chains, members[pack], implementation->packs[pack].lanes,
+                implementation->tables);
+        implementation->pieces[pack] = piecesOf(chains, members[pack]);
+    }
+    for (WidePack& wide : implementation->wide) {
+        if (none_of(packs.begin(), packs.end(), [&] (int pack) {return pack >= wide.first && pack < wide.last;}))
+            continue;
+        vector<int> together;
+        for (int pack = wide.first; pack < wide.last; pack++)
+            together.insert(together.end(), members[pack].begin(), members[pack].end());
+        wide = WidePack(chains, together, wide.first, wide.last);
+    }
+    return true;
 }
 
 int ChainEngine::getNumPacks() const {

@@ -122,6 +122,14 @@ public:
     ChainEngine(const std::vector<Chain>& chains, const std::vector<PieceOfChain>& origins);
     ~ChainEngine();
     /**
+     * Take over chains that have other nodes, segments and joints than before. Packs without such stay as they are.
+     *
+     * @param chains   all chains
+     * @param changed  the numbers of those that are others
+     * @return whether it is done: if not, chains have become too different for their packs, and a new engine is needed
+     */
+    bool replaceChains(const std::vector<Chain>& chains, const std::vector<int>& changed);
+    /**
      * Get the number of packs in double precision, which hold all chains.
      */
     int getNumPacks() const;

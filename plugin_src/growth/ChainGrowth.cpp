@@ -81,9 +81,13 @@ double ChainGrowth::getConcentration(const GrowthState& state, int pool) const {
 double ChainGrowth::getRate(const GrowthState& state, const Event& event) const {
     const GrowingChain& own = system.chains[event.index];
     const GrowingEnd& end = own.ends[event.end];
-    if (event.gains)
-        return end.onRate*getConcentration(state, own.pool);
-    return state.ranges[event.index].size() > own.leastMonomers ? end.offRate : 0;
+    const bool shrinks = state.shrinks[2*event.index+event.end] != 0;
+    if (event.kind == EventKind::Switch)
+        return shrinks ? end.rescueRate : end.catastropheRate;
+    const EndRates& rates = shrinks ? end.shrinking : end;
+    if (event.gains())
+        return rates.onRate > 0 ? rates.onRate*getConcentration(state, own.pool) : 0;
+    return state.ranges[event.index].size() > own.leastMonomers ? rates.offRate : 0;
 }
 
 int ChainGrowth::advance(GrowthState& state, const GrowthStep& step, ChainList& chains, double* positions,
@@ -113,8 +117,8 @@ bool ChainGrowth::takeTurns(GrowthState& state, const GrowthStep& step, const ve
         auto forEvents = [&] (auto function) {
             for (int index : members)
                 for (int end : {0, 1})
-                    for (bool gains : {false, true})
-                        if (function(Event {index, end, gains}))
+                    for (EventKind kind : {EventKind::Lose, EventKind::Gain, EventKind::Switch})
+                        if (function(Event {index, end, kind}))
                             return;
         };
         forEvents([&] (const Event& event) {
@@ -127,7 +131,7 @@ bool ChainGrowth::takeTurns(GrowthState& state, const GrowthStep& step, const ve
         if (time >= step.stepSize)
             return true;
         double chosen = random.uniform()*total;
-        Event next = {members[0], 0, false};
+        Event next = {members[0], 0, EventKind::Lose};
         forEvents([&] (const Event& event) {
             const double rate = getRate(state, event);
             if (rate > 0)
@@ -135,9 +139,20 @@ bool ChainGrowth::takeTurns(GrowthState& state, const GrowthStep& step, const ve
             chosen -= rate;
             return chosen < 0;
         });
-        apply(state, step, next, random, chains, positions, around);
+        if (next.kind == EventKind::Switch)
+            switchEnd(state, next);
+        else
+            apply(state, step, next, random, chains, positions, around);
     }
     return false;
+}
+
+/** Let an end begin to shrink, or to grow again. */
+void ChainGrowth::switchEnd(GrowthState& state, const Event& event) const {
+    const size_t end = 2*event.index+event.end;
+    EndEvents& events = state.events[end];
+    (state.shrinks[end] != 0 ? events.rescues : events.catastrophes)++;
+    state.shrinks[end] = state.shrinks[end] == 0;
 }
 
 /** Let an event happen, unless energies or a lack of nodes are against it. */
@@ -183,9 +198,9 @@ void ChainGrowth::apply(GrowthState& state, const GrowthStep& step, const Event&
     }
     MonomerRange range = state.ranges[event.index];
     if (event.end == 1)
-        range.last += event.gains ? 1 : -1;
+        range.last += event.gains() ? 1 : -1;
     else
-        range.first += event.gains ? -1 : 1;
+        range.first += event.gains() ? -1 : 1;
     vector<double> alongBefore, alongAfter;
     if (!around.empty()) {
         alongBefore = findLengths(event.index, state.ranges[event.index]);
@@ -202,8 +217,8 @@ void ChainGrowth::apply(GrowthState& state, const GrowthStep& step, const Event&
         all->accept(change);
     state.ranges[event.index] = range;
     if (system.pools[own.pool].isClosed())
-        state.free[own.pool] += event.gains ? -1 : 1;
-    (event.gains ? events.gained : events.lost)++;
+        state.free[own.pool] += event.gains() ? -1 : 1;
+    (event.gains() ? events.gained : events.lost)++;
     known.nodes.swap(after);
     known.hasChanged = true;
 }
@@ -231,9 +246,9 @@ bool ChainGrowth::propose(const GrowthState& state, const GrowthStep& step, cons
     MonomerRange range = state.ranges[index];
     const SegmentDivision old(range, perSegment);
     if (end == 1)
-        range.last += event.gains ? 1 : -1;
+        range.last += event.gains() ? 1 : -1;
     else
-        range.first += event.gains ? -1 : 1;
+        range.first += event.gains() ? -1 : 1;
     if (range.size() < 1)
         return false;
     const SegmentDivision next(range, perSegment);

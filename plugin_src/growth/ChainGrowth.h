@@ -12,11 +12,23 @@
 
 namespace cylchain {
 
-/** How an end gains monomers, in nm^3/ps, which is per number in a volume, and loses them, in 1/ps. */
-struct GrowingEnd {
+/** The rates at which an end gains monomers, in nm^3/ps, which is per number in a volume, and loses them, in 1/ps. */
+struct EndRates {
     double onRate = 0, offRate = 0;
+};
+
+/**
+ * An end: its rates, and those while it shrinks if it does so in turn (dynamic instability), with the rates, in 1/ps, at
+ * which it begins to shrink and at which it is rescued.
+ */
+struct GrowingEnd : EndRates {
+    EndRates shrinking = {};
+    double catastropheRate = 0, rescueRate = 0;
+    bool switches() const {
+        return catastropheRate > 0 || rescueRate > 0;
+    }
     bool grows() const {
-        return onRate > 0 || offRate > 0;
+        return onRate > 0 || offRate > 0 || shrinking.onRate > 0 || shrinking.offRate > 0;
     }
 };
 
@@ -51,6 +63,8 @@ struct EndEvents {
     long long gained = 0, lost = 0;
     /** How often it would have gained a monomer, but had no spare node. */
     long long waited = 0;
+    /** How often it has begun to shrink, and was rescued. */
+    long long catastrophes = 0, rescues = 0;
 };
 
 /** What grows, at a time. */
@@ -60,6 +74,8 @@ struct GrowthState {
     /** Of each growing chain, and its ends. */
     std::vector<MonomerRange> ranges;
     std::vector<EndEvents> events;
+    /** Whether each end shrinks, of those that do so in turn. */
+    std::vector<char> shrinks;
     /** The monomers that are free, of each pool that is closed. */
     std::vector<long long> free;
 };
@@ -87,6 +103,9 @@ struct GrowthStep {
  * with one monomer more or less (SegmentLaws); a joint that comes is drawn, with its two segments, and one that goes is
  * forgotten. U is that of equilibrium before and after.
  *
+ * An end with dynamic instability has other rates while it shrinks, and begins and ends to do so at random: its rates
+ * are those of no equilibrium.
+ *
  * Random numbers belong to the seed, the number of the step, and the chain or, if its pool is closed, the pool: all
  * chains of a closed pool take their turns in the order of time.
  */
@@ -107,9 +126,13 @@ public:
             const std::vector<Surroundings*>& around, std::vector<int>& changed);
 private:
     /** What may happen to a chain. */
+    enum class EventKind {Gain, Lose, Switch};
     struct Event {
         int index, end;
-        bool gains;
+        EventKind kind;
+        bool gains() const {
+            return kind == EventKind::Gain;
+        }
     };
     /** A chain that an event has come to in this step. */
     struct Present {
@@ -125,6 +148,7 @@ private:
     double getRate(const GrowthState& state, const Event& event) const;
     bool takeTurns(GrowthState& state, const GrowthStep& step, const std::vector<int>& members, std::uint32_t number,
             ChainList& chains, double* positions, const std::vector<Surroundings*>& around);
+    void switchEnd(GrowthState& state, const Event& event) const;
     void apply(GrowthState& state, const GrowthStep& step, const Event& event, RandomNumbers& random,
             ChainList& chains, const double* positions, const std::vector<Surroundings*>& around);
     bool propose(const GrowthState& state, const GrowthStep& step, const Event& event, RandomNumbers& random,

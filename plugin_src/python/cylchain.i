@@ -233,7 +233,8 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         double& strainShare, double& unbindingForce, double& catchRate, double& catchForce, double& speed,
         double& stallForce, double& volume, double& concentration, double& elementLength, double& stretchingModulus,
         double& bendingRigidity, double& shortening, double& minusOnRate, double& minusOffRate, double& plusOnRate,
-        double& plusOffRate};
+        double& plusOffRate, double& shrinkingOnRate, double& shrinkingOffRate, double& catastropheRate,
+        double& rescueRate};
 %apply bool& OUTPUT {bool& walksBackward, bool& holdsAtEnds, bool& sameChain};
 %apply long long& OUTPUT {long long& bindings, long long& unbindings};
 

@@ -72,7 +72,7 @@ def test_virial(nu, reduced_temperature, bonds, planar):
 def by_quadrature(nu, reduced_temperature, planar):
     """<u_1^2>, <u_1.u_2> of two bonds, by sums over lengths and the angle between them with the energy of eq. (1)."""
     reach = 9.0 * np.sqrt(reduced_temperature / (1.0 - 2.0 * nu))
-    node, weight = np.polynomial.legendre.leggauss(160)
+    node, weight = np.polynomial.legendre.leggauss(96)
     low, high = max(0.0, 1.0 / (1.0 - nu) - reach), 1.0 / (1.0 - nu) + reach
     length = 0.5 * (high + low + (high - low) * node)
     angle = 0.5 * np.pi * (node + 1.0)

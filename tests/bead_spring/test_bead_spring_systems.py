@@ -27,7 +27,7 @@ from openmm_cylchain.engines.gpu_platforms import GPU_PLATFORMS
 from openmm_cylchain.units.quantities import thermal_energy
 from support.contexts import close_reporters, energy_of, forces_of, new_context, new_simulation, positions_of
 from support.noise_covariance import assert_covariance, moves_of_a_step
-from support.platforms import ENGINE_PLATFORMS, ENGINE_SCHEMES, ENGINES
+from support.platforms import ENGINE_PLATFORMS, ENGINE_SCHEMES, ENGINES, ENGINES_PORTABLE_SLOW
 
 KIND, ROOM, VISCOSITY = DSDNA_BASE_PAIRS, 296.15, 602.0
 KT = thermal_energy(ROOM)
@@ -198,7 +198,7 @@ SIGMAS, ALLOWED = 4.0, 0.02
 
 @pytest.mark.sample("compiled|True")
 @pytest.mark.parametrize("planar", [False, True])
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINES_PORTABLE_SLOW)
 def test_energies_of_short_chains_are_exact(engine, planar):
     """At the recommended explicit step, no mode has a variance more than 5 % too large, and bends have 1.2 %."""
     bonds, count, scheme = 4, 600, "euler" if planar else "midpoint"
@@ -249,7 +249,10 @@ def test_joints_of_a_pulled_chain_carry_the_force():
     assert np.all(np.abs(by_chain.mean(axis=0) - force) < SIGMAS * error)
 
 
-@pytest.mark.parametrize(("engine", "scheme", "stiffness"), [("compiled", "implicit", 1e3), ("portable", "euler", 2e4)])
+@pytest.mark.parametrize(
+    ("engine", "scheme", "stiffness"),
+    [("compiled", "implicit", 1e3), pytest.param("portable", "euler", 2e4, marks=pytest.mark.slow)],
+)
 def test_a_spring_between_beads_has_its_energy_at_the_recommended_step(engine, scheme, stiffness):
     """3/2 k_B T, where two free chains are joined by a spring of no length, and 5 % more at most."""
     filaments, generator, pairs, bonds = Filaments(VISCOSITY, ROOM, engine=engine), np.random.default_rng(3), 100, 4

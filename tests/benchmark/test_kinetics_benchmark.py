@@ -72,8 +72,8 @@ def test_energies_are_those_of_the_context(relaxed):
     assert sum(energies.values()) * THERMAL_ENERGY == pytest.approx(potential, rel=1e-6)
 
 
-def test_filaments_on_top_of_each_other_come_apart(relaxed):
-    crowded = replace(SMALL, filaments=60)
+def test_filaments_on_top_of_each_other_come_apart():
+    crowded = replace(SMALL, filaments=30)
     before = create_bundle(crowded, 1.0).energies()["contact"]
     after = create_bundle(crowded, 1.0, positions=relaxed_positions(crowded, 5)).energies()["contact"]
     assert before > 100.0

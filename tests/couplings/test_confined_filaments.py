@@ -55,7 +55,7 @@ def _bends_in_steps(step, steps, count):
 
 @pytest.mark.parametrize(
     ("milliseconds", "steps"),
-    [pytest.param(5.0, 200, marks=pytest.mark.slow), (1.0, 300), pytest.param(0.2, 1500, marks=pytest.mark.slow)],
+    [pytest.param(5.0, 200, marks=pytest.mark.slow), (1.0, 150), pytest.param(0.2, 1500, marks=pytest.mark.slow)],
 )
 def test_bends_between_walls(milliseconds, steps):
     """Against draws from equilibrium, which NumPy makes. Steps of any length are within 8 % of it."""

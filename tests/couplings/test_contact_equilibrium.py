@@ -159,7 +159,9 @@ def test_equation_of_state(name):
 
 
 @pytest.mark.sample(r"^1\.0-|^0\.1-0\.5")
-@pytest.mark.parametrize("stiffness", [0.05, 0.5, pytest.param(5.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "stiffness", [pytest.param(0.05, marks=pytest.mark.slow), 0.5, pytest.param(5.0, marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("factor", FACTORS)
 def test_rods_between_walls(stiffness, factor):
     system = rods_between_walls(stiffness)

@@ -93,7 +93,7 @@ def _check(segments, sphere, share_of_step, samples, pairs=400):
 
 
 def test_gaps_of_two_rods_at_the_recommended_step():
-    _check(1, False, 1.0, 1200)
+    _check(1, False, 1.0, 800)
 
 
 @pytest.mark.slow

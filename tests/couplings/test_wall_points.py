@@ -19,8 +19,8 @@ SHAPES = {
 }
 
 
-def _area_beyond(shape, height):
-    """The share of the area of a shape, within the box, that is above a height: by a fine grid of parameters."""
+def _areas_beyond(shape, heights):
+    """The shares of the area of a shape, within the box, that are above heights: by a fine grid of parameters."""
     first, second = (np.arange(1500) + 0.5) / 1500, (np.arange(1501) + 0.5) / 1501
     one, other = np.meshgrid(first, second, indexing="ij")
     if isinstance(shape, Box):
@@ -49,8 +49,8 @@ def _area_beyond(shape, height):
             faces = [flat + side * getattr(shape, "thickness", 0.0) * normal for side in sides]
         faces = [(points, np.ones(points.shape[:-1])) for points in faces]
     within = [np.all((points >= LOWER) & (points <= UPPER), axis=-1) * area for points, area in faces]
-    beyond = sum((area * (points[..., 2] > height)).sum() for (points, _), area in zip(faces, within, strict=True))
-    return beyond / sum(area.sum() for area in within)
+    total, places = sum(area.sum() for area in within), list(zip(faces, within, strict=True))
+    return [sum((area * (points[..., 2] > height)).sum() for (points, _), area in places) / total for height in heights]
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -71,8 +71,8 @@ def test_points_are_on_walls_with_the_same_chance_for_each_area(name):
         side = -1.0 if isinstance(shape, Plane) else np.sign((points - shape.point) @ shape.normal)[:, None]
         outward = points + 1e-6 * side * shape.normal
     assert np.all(shape.square_depth(outward) > 0.0)
-    for height in (-20.0, 5.0, 15.0):
-        share = _area_beyond(shape, height)
+    heights = (-20.0, 5.0, 15.0)
+    for height, share in zip(heights, _areas_beyond(shape, heights)):
         assert 0.02 < share < 0.98
         error = np.sqrt(share * (1 - share) / COUNT)
         assert 4 * error < 0.05 or share < 0.3

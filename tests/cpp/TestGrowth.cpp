@@ -111,6 +111,13 @@ struct Weights {
     }
 };
 
+static GrowingEnd endOf(double onRate, double offRate) {
+    GrowingEnd end;
+    end.onRate = onRate;
+    end.offRate = offRate;
+    return end;
+}
+
 /** Chains that grow, where they are and what they have become. */
 struct Growing {
     ChainList chains;
@@ -156,9 +163,11 @@ struct Growing {
         }
         for (size_t i = 0; i < chain.spareNodes.size(); i++)
             put();
-        system.chains.push_back({chains.add(chain), 0, pool, 2, {minus, plus}});
+        GrowingChain own = {chains.add(chain), 0, pool, 2, {minus, plus}};
+        system.chains.push_back(own);
         state.ranges.push_back(range);
         state.events.resize(2*state.ranges.size());
+        state.shrinks.resize(2*state.ranges.size(), 0);
         bending.push_back(weights.bending);
         stretching.push_back(weights.stretching);
         planar.push_back(weights.planar);
@@ -194,7 +203,7 @@ static void checkMean(double expected, const Mean& found, double power, const st
 
 /** Rates, and energies of lengths and bends, of chains that have grown and shrunk, at a step of so many events. */
 static void checkFreeEnds(const Weights& weights, double events) {
-    const int number = 3000;
+    const int number = 1800;
     mt19937_64 generator = generatorOf(5);
     Growing all;
     all.system.tables = {makeTable(hasRange(weights.stretching))};
@@ -202,7 +211,7 @@ static void checkFreeEnds(const Weights& weights, double events) {
     all.state.free = {0};
     // The plus end gains 3 and loses 2 per time, and the minus end 1 and 2.5.
     for (int i = 0; i < number; i++)
-        all.add(weights, {-20-i%PER_SEGMENT, 24+i%7}, 14, {50, 2.5}, {150, 2}, generator);
+        all.add(weights, {-20-i%PER_SEGMENT, 24+i%7}, 14, endOf(50, 2.5), endOf(150, 2), generator);
     ChainGrowth growth = all.makeGrowth();
     const double time = 8, stepSize = events/8.5;
     const int steps = max(1.0, round(time/stepSize));
@@ -268,7 +277,7 @@ static void checkRodBeforeWall(double events) {
     all.system.pools = {{0.01, 0}};
     const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
     for (int i = 0; i < 300; i++)
-        all.add(weights, {0, 14}, 2, {}, {100*z, 1}, generator);
+        all.add(weights, {0, 14}, 2, {}, endOf(100*z, 1), generator);
     // They have two segments from 18 monomers on, for which there are no nodes.
     EndWalls wall({WallShape::Plane, {distance, 0, 0}, {-1, 0, 0}, 0}, stiffness, Array(300, 0.0));
     ChainGrowth growth = all.makeGrowth();
@@ -279,7 +288,7 @@ static void checkRodBeforeWall(double events) {
     const double stepSize = events/(1+z);
     const int steps = max(1.0, 4/stepSize);
     for (int block = -2; block < blocks; block++)
-        for (int sample = 0; sample < 60; sample++) {
+        for (int sample = 0; sample < 25; sample++) {
             for (int i = 0; i < steps; i++)
                 growth.advance(all.state, {KT, 4.0/steps, 9}, all.chains, all.x.data(), {&wall}, changed);
             for (const MonomerRange& range : all.state.ranges)
@@ -338,7 +347,7 @@ static void testPool() {
     const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
     const int least = 2, monomers = 30+2*10;
     for (int i = 0; i < 2; i++)
-        all.add(weights, {0, 10}, 12, {}, {30.0+10*i, 0.9}, generator);
+        all.add(weights, {0, 10}, 12, {}, endOf(30.0+10*i, 0.9), generator);
     ChainGrowth growth = all.makeGrowth();
     // P(N, M) is the product of k_on (free)/V/k_off over the monomers of both, one after the other.
     double norm = 0, first = 0, second = 0;
@@ -357,7 +366,7 @@ static void testPool() {
     vector<int> changed;
     for (int block = 0; block < 40; block++) {
         Mean one, other;
-        for (int i = 0; i < 4000; i++) {
+        for (int i = 0; i < 2500; i++) {
             growth.advance(all.state, {KT, 5, 3}, all.chains, all.x.data(), {}, changed);
             one.add(all.state.ranges[0].size());
             other.add(all.state.ranges[1].size());
@@ -366,8 +375,54 @@ static void testPool() {
         ofFirst.add(one.mean());
         ofSecond.add(other.mean());
     }
-    checkMean(first/norm, ofFirst, 0.05, "the first chain of a pool");
-    checkMean(second/norm, ofSecond, 0.05, "the second chain of a pool");
+    checkMean(first/norm, ofFirst, 0.07, "the first chain of a pool");
+    checkMean(second/norm, ofSecond, 0.07, "the second chain of a pool");
+}
+
+/** Ends with dynamic instability: the law of their lengths where it is bounded, by the rates of single monomers. */
+static void testDynamicInstability() {
+    for (double stepSize : {0.05, 5.0}) {
+        mt19937_64 generator = generatorOf(6);
+        Growing all;
+        all.system.tables = {makeTable(false)};
+        all.system.pools = {{1, 0}};
+        const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
+        // Monomers come at 3 per time or go at 6, and ends turn at 0.5 and 0.2.
+        GrowingEnd plus = endOf(3, 0);
+        plus.shrinking.offRate = 6;
+        plus.catastropheRate = 0.5;
+        plus.rescueRate = 0.2;
+        for (int i = 0; i < 400; i++)
+            all.add(weights, {0, 12}, 20, endOf(0, 0), plus, generator);
+        ChainGrowth growth = all.makeGrowth();
+        // The stationary law of 2, 3, ... monomers, from the balance of what crosses between n and n+1: 3 g = 6 s.
+        // g(n) (0.5+3) = 3 g(n-1)+0.2 s(n), with s(n) = g(n-1)/2.
+        double g = 1, norm = 0, mean = 0;
+        // With two monomers, an end that shrinks waits: 0.2 s = 0.5 g+6 s(3), and s(3) = g/2.
+        for (int n = 2; n < 2000; n++) {
+            const double s = n == 2 ? (0.5*g+3*g)/0.2 : 0.5*g;
+            const double next = n == 2 ? g : (3*g+0.2*0.5*g)/3.5;
+            const double now = n == 2 ? g : next;
+            norm += now+s;
+            mean += n*(now+s);
+            g = now;
+        }
+        mean /= norm;
+        Mean found;
+        vector<int> changed;
+        for (int block = -4; block < 16; block++) {
+            Mean lengths;
+            for (int i = 0; i < 20/stepSize; i++) {
+                growth.advance(all.state, {KT, stepSize, 3}, all.chains, all.x.data(), {}, changed);
+                if (i%max(1, static_cast<int>(1/stepSize)) == 0)
+                    for (const MonomerRange& range : all.state.ranges)
+                        lengths.add(range.size());
+            }
+            if (block >= 0)
+                found.add(lengths.mean());
+        }
+        checkMean(mean, found, 0.08, "lengths with dynamic instability");
+    }
 }
 
 /** What comes to one chain does not depend on others. */
@@ -379,7 +434,7 @@ static void testOrder() {
         all.system.tables = {makeTable(false)};
         all.system.pools = {{0.02, 0}};
         for (int i = 0; i < number; i++)
-            all.add(weights, {0, 30}, 14, {50, 1}, {150, 2}, generator);
+            all.add(weights, {0, 30}, 14, endOf(50, 1), endOf(150, 2), generator);
         ChainGrowth growth = all.makeGrowth();
         vector<int> changed;
         for (int i = 0; i < 20; i++)
@@ -408,7 +463,7 @@ static void testContacts() {
     mt19937_64 generator = generatorOf(8);
     normal_distribution<double> normal;
     int touching = 0, passing = 0;
-    for (int round = 0; round < 4000; round++) {
+    for (int round = 0; round < 2000; round++) {
         // Chains that wind through a small ball, and spheres.
         vector<vector<Vec3d> > nodes;
         const int numChains = 5;
@@ -492,7 +547,7 @@ static void testContacts() {
         checkClose(-difference, contacts.findChange(back), 1+fabs(energy), 1e-9,
                 "the contacts of an end that goes back");
     }
-    check(touching > 700 && passing > 50, "too few contacts: "+to_string(touching)+", "+to_string(passing));
+    check(touching > 350 && passing > 25, "too few contacts: "+to_string(touching)+", "+to_string(passing));
 }
 
 /** The change at an end is that of the energy of all links, whose places stay where they are along chains. */
@@ -609,7 +664,7 @@ static void testRodInTheWay() {
     all.system.tables = {makeTable(false)};
     all.system.pools = {{0.01, 0}};
     const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
-    all.add(weights, {0, 10}, 2, {}, {400, 1}, generator);
+    all.add(weights, {0, 10}, 2, {}, endOf(400, 1), generator);
     Chain other;
     other.nodes = {2, 3};
     other.fixed = {true, true};
@@ -629,6 +684,7 @@ static void testRodInTheWay() {
 }
 
 int main() {
-    return runTests({testDivision, testFreeEnds, testRodBeforeWall, testPool, testOrder, testContacts, testLinks,
+    return runTests({testDivision, testFreeEnds, testRodBeforeWall, testPool, testDynamicInstability, testOrder, testContacts,
+            testLinks,
             testRodInTheWay});
 }

@@ -6,7 +6,7 @@ import re
 import pytest
 
 import openmm_cylchain
-from openmm_cylchain import Crosslinker, analysis, scans, theory
+from openmm_cylchain import Crosslinker, analysis, rendering, scans, theory
 from openmm_cylchain.analysis import statistics
 from openmm_cylchain.kinetics import presets
 from support.pages import PAGES, headings_of, name_of
@@ -50,7 +50,7 @@ def entries(stem):
 
 def test_every_public_name_is_in_the_reference():
     """Once, and nothing else is."""
-    modules = {"analysis", "scans", "theory"}
+    modules = {"analysis", "rendering", "scans", "theory"}
     named = [name for stem in REFERENCE if stem not in modules for name in entries(stem)]
     assert ".. automodule:: openmm_cylchain.kinetics.presets" in REFERENCE["linkers"]
     named += [name for name, thing in vars(presets).items() if isinstance(thing, Crosslinker)]
@@ -60,10 +60,11 @@ def test_every_public_name_is_in_the_reference():
     assert sorted(entries("analysis")) == sorted({*analysis.__all__} - {"statistics"})
     assert f".. automodule:: {statistics.__name__}" in REFERENCE["analysis"]
     assert sorted(entries("theory")) == sorted(theory.__all__)
+    assert sorted(entries("rendering")) == sorted(rendering.__all__)
 
 
 def test_public_names_have_docstrings():
-    for module in (openmm_cylchain, analysis, theory):
+    for module in (openmm_cylchain, analysis, rendering, theory):
         for name in module.__all__:
             thing = getattr(module, name)
             if inspect.isclass(thing) or inspect.isfunction(thing):
@@ -81,7 +82,9 @@ def test_scans_are_in_the_reference():
     assert sorted(entries("scans")) == sorted(scans.__all__)
 
 
-@pytest.mark.parametrize("module", [openmm_cylchain, analysis, theory, scans, statistics], ids=lambda own: own.__name__)
+@pytest.mark.parametrize(
+    "module", [openmm_cylchain, analysis, theory, rendering, scans, statistics], ids=lambda own: own.__name__
+)
 def test_signatures_are_short(module):
     """``help`` shows names of types, rather than what they stand for."""
     for name, thing in vars(module).items():

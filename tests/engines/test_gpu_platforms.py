@@ -43,7 +43,7 @@ def work_items(request, monkeypatch):
 EITHER_WAY = pytest.mark.parametrize("work_items", WORK_ITEMS, indirect=True)
 """Runs a test with one work-item for a filament, and with several."""
 
-# PoCL compiles the kernel of several for some seconds in each precision.
+# PoCL compiles the kernels of several for half a minute in each precision.
 EITHER_WAY_IF_SLOW = pytest.mark.parametrize(
     "work_items", [1, *(pytest.param(items, marks=pytest.mark.slow) for items in WORK_ITEMS[1:])], indirect=True
 )
@@ -158,6 +158,7 @@ def _compare_work_items(gpu, monkeypatch, add, step, scheme):
     return divided
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order"])
 def test_filaments_of_any_length_move_alike_either_way(gpu, scheme, monkeypatch):
     assert _compare_work_items(gpu, monkeypatch, _add_of_all_lengths, 2e6, scheme) == [0] * len(WORK_ITEMS)
@@ -171,6 +172,7 @@ def test_rings_of_any_length_move_alike_either_way(gpu, scheme, monkeypatch):
     assert len(set(divided)) == 1 and divided[0] > 20
 
 
+@pytest.mark.slow
 def test_divided_steps_are_those_of_one_work_item(gpu, monkeypatch):
     divided = _compare_work_items(gpu, monkeypatch, _add_of_all_lengths, 3e7, "implicit")
     assert len(set(divided)) == 1 and divided[0] > 0
@@ -219,7 +221,7 @@ def _crossing_context(platform, precision=None, tether=True):
     return new_context(system, positions, integrator, platform, {"Precision": precision} if precision else {})
 
 
-@EITHER_WAY
+@EITHER_WAY_IF_SLOW
 def test_filaments_cross_a_periodic_box_while_particles_are_reordered(gpu, work_items):
     """For longer than OpenMM waits to reorder particles; the tether's point is some boxes away from its node."""
     expected, found = _crossing_context("Reference"), _crossing_context(gpu, "double")
@@ -266,7 +268,7 @@ def test_couplings_reach_across_periodic_boxes(gpu):
     assert np.abs(positions_of(found) - positions_of(expected)).max() < TOLERANCES["double"]
 
 
-@EITHER_WAY
+@EITHER_WAY_IF_SLOW
 def test_failure_leaves_positions_before_the_step(gpu, work_items):
     context = _context("open", "implicit", gpu, "double")
     integrator = context.getIntegrator()
@@ -309,7 +311,7 @@ def test_steps_taken_together_are_those_taken_one_by_one(gpu, work_items):
     assert np.array_equal(*ends)
 
 
-@EITHER_WAY
+@EITHER_WAY_IF_SLOW
 def test_moved_tethers_hold_filaments_elsewhere(gpu, work_items):
     """Parameters are updated in one of two Contexts, which follows the Reference platform as before."""
     contexts, ends = [], []
@@ -330,7 +332,7 @@ def test_moved_tethers_hold_filaments_elsewhere(gpu, work_items):
     assert np.abs(ends[2] - ends[0]).max() > 10
 
 
-@EITHER_WAY
+@EITHER_WAY_IF_SLOW
 def test_filaments_among_many_particles_with_virtual_sites_agree(gpu, work_items):
     """100 steps with noise of all that a System of particles has, and ten filaments."""
     (filaments, expected), (_, found) = mixed_context("Reference"), mixed_context(gpu, "double")

@@ -12,7 +12,12 @@ from openmm import unit
 from scipy.integrate import quad
 
 from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, Filaments, FilamentType, InputError
-from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, SegmentLengthDistribution, draw_chain
+from openmm_cylchain.filaments.equilibrium import (
+    JointAngleDistribution,
+    SegmentLengthDistribution,
+    _tangents_in_space,
+    draw_chain,
+)
 from support.bending_models import BENDING_MODELS
 
 TEMPERATURE = 300.0
@@ -247,6 +252,23 @@ def test_first_segment_is_isotropic():
         assert_mean(component, 0.0, scale=1.0)
         assert_mean(component**2, 1 / 3)
     assert_mean(directions[:, 0] * directions[:, 1], 0.0, scale=1.0)
+
+
+def test_tangents_of_a_long_chain_stay_unit_vectors_with_the_drawn_angles():
+    """As they are turned by joint after joint, rounding does not add up."""
+    generator = np.random.default_rng(3)
+    cosines = 1.0 - 2e-3 * generator.random(100000)
+    tangents = _tangents_in_space(cosines, generator, np.array([0.0, 3.0, 4.0]))
+    assert tangents[0] == pytest.approx([0.0, 0.6, 0.8], abs=1e-15)
+    np.testing.assert_allclose(np.linalg.norm(tangents, axis=1), 1.0, atol=1e-14)
+    np.testing.assert_allclose(np.einsum("ij,ij->i", tangents[1:], tangents[:-1]), cosines, atol=1e-12)
+
+
+@pytest.mark.parametrize("stiffness", [3.0, 5000.0])
+def test_means_of_legendre_polynomials(stiffness):
+    joint = JointAngleDistribution(chain_type(joint_stiffness=stiffness), TEMPERATURE)
+    expected = [joint.mean(lambda x, n=n: np.polynomial.legendre.legval(x, np.eye(41)[n])) for n in (0, 1, 7, 40)]
+    assert joint.legendre_means(41)[[0, 1, 7, 40]] == pytest.approx(expected, abs=1e-12)
 
 
 # End-to-end distances. (length over persistence length, segments, chains)

@@ -18,11 +18,13 @@ from openmm_cylchain import (
     MICROTUBULE,
     BeadSpringType,
     Crosslinks,
+    DynamicInstability,
     FilamentReporter,
     Filaments,
     Growth,
     GrowthReporter,
     InputError,
+    InstabilityError,
     LinkerTable,
     MonomerPool,
     Monomers,
@@ -51,6 +53,10 @@ RATES = ("plus_on_rate", "plus_off_rate", "minus_on_rate", "minus_off_rate")
 
 def growth(**changes):
     return Growth(**{"monomers": ACTIN_ATP, "pool": 50 * MICROMOLAR, "longest": 600 * NM, **changes})
+
+
+def turning(**changes):
+    return DynamicInstability(**{"catastrophe_rate": 0.0, "rescue_rate": 0.0, "shrinking_off_rate": 0.0, **changes})
 
 
 def growing(count=1, kind=KIND, segments=4, still=0, apart=30.0, **options):
@@ -97,6 +103,17 @@ def live_nodes(filaments, context):
             MonomerPool(5e-6 * 6.02214076e23 / 1e24, 0.5e9),
         ),
         (MonomerPool(2 / unit.micrometer**3), MonomerPool(2e-9)),
+        (
+            DynamicInstability(
+                catastrophe_rate=0.5 / SECOND,
+                rescue_rate=30 / unit.minute,
+                shrinking_off_rate=0.7 / unit.millisecond,
+                shrinking_on_rate=1e-6 * unit.micrometer**3 / SECOND,
+            ),
+            DynamicInstability(
+                catastrophe_rate=5e-13, rescue_rate=5e-13, shrinking_off_rate=7e-10, shrinking_on_rate=1e-9
+            ),
+        ),
         (growth(shortest=0.1 * unit.micrometer), growth(longest=600.0, shortest=100.0)),
     ],
 )
@@ -130,6 +147,12 @@ def test_monomers_of_wrong_values(name, value):
         (lambda: growth(shortest=700.0), "longest must exceed shortest"),
         (lambda: growth(plus_capped=True, minus_capped=True), "two capped ends"),
         (lambda: growth(plus_capped="yes"), "plus_capped"),
+        (lambda: growth(plus_instability=1.0), "plus_instability"),
+        (lambda: growth(plus_capped=True, plus_instability=turning()), "plus end is capped"),
+        (lambda: turning(catastrophe_rate=-1.0), "catastrophe_rate"),
+        (lambda: turning(rescue_rate=np.nan), "rescue_rate"),
+        (lambda: turning(shrinking_off_rate=1 * NM), "shrinking_off_rate"),
+        (lambda: turning(shrinking_on_rate=1 / SECOND), "shrinking_on_rate"),
         (lambda: Monomers(length=2.7).treadmilling_concentration, "never grow"),
         (lambda: growing(growth=ACTIN_ATP), "growth"),
         (lambda: growing(growth=growth(longest=200.0)), "216 nm long, but its growth has filaments between"),
@@ -298,7 +321,8 @@ def test_energies_tensions_and_virial_of_what_has_grown():
 def crowded(request):
     """Filaments in a sphere that touch each other, with a pool that stays or runs dry; and how far they are."""
     pool = MonomerPool(50 * MICROMOLAR, request.param)
-    filaments = growing(3, apart=9.0, segments=3, growth=growth(pool=pool))
+    unstable = turning(catastrophe_rate=2e-11, rescue_rate=2e-11, shrinking_off_rate=1e-10)
+    filaments = growing(3, apart=9.0, segments=3, growth=growth(pool=pool, plus_instability=unstable))
     _, system, positions = filaments.build()
     system.addForce(capsule_contact_force(filaments, system, 8.0))
     system.addForce(filament_wall_force(filaments, system, Sphere([80, 9, 0], 200.0), 10.0))
@@ -315,7 +339,15 @@ def crowded(request):
 
 def all_of(filaments, context):
     state = filaments.in_context(context).growth()
-    counts = (state.monomers, state.gained, state.lost, state.waited)
+    counts = (
+        state.monomers,
+        state.gained,
+        state.lost,
+        state.waited,
+        state.shrinking,
+        state.catastrophes,
+        state.rescues,
+    )
     columns = positions_of(context), state.concentrations._value, *counts
     return np.concatenate([column.ravel() for column in columns])
 
@@ -410,8 +442,9 @@ def test_steps_that_resolve_how_ends_push():
             filaments.create_integrator(system, share / rate)
         assert any("gains 0.55 monomers" in str(one.message) for one in caught) == warned
         assert all(one.category is TimeStepWarning for one in caught)
-    with pytest.raises(InputError, match="Filament 0 .*monomers per second.*check the units"):
-        filaments.create_integrator(system, 2e5 / rate)
+    for own in (filaments, growing(growth=growth(plus_instability=turning(shrinking_off_rate=rate)))):
+        with pytest.raises(InputError, match="Filament 0 .*monomers per second.*check the units"):
+            own.create_integrator(system if own is filaments else own.build()[1], 2e5 / rate)
 
 
 def test_the_shortest_segment_at_an_end_counts_for_steps():
@@ -455,3 +488,13 @@ def test_a_context_by_default(tmp_path):
     still, system, positions = built(growing(0, still=1))
     with pytest.raises(InputError, match="No filaments grow"):
         still.in_context(in_context(still, system, positions)).growth()
+
+
+def test_positions_of_another_length(crowded):
+    """Segments of the present one have no place there."""
+    filaments, system, positions, _, _ = crowded
+    context = in_context(filaments, system, positions)
+    context.getIntegrator().step(100)
+    context.setPositions(positions)
+    with pytest.raises(InstabilityError, match="Positions of filaments that grow are those of a length"):
+        context.getIntegrator().step(1)

@@ -78,7 +78,7 @@ def test_binding_and_motion_are_in_equilibrium_together(step, rest_length, strai
     interval = max(1, round(1.5 / step))
     integrator.step(8 * interval)
     bound, squares = [], []
-    for _ in range(300):
+    for _ in range(180):
         integrator.step(interval)
         bound.append(here.linkers().bound[:, 1].mean())
         lengths = here.linker_pulls().lengths

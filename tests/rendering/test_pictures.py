@@ -13,12 +13,15 @@ from PIL import Image
 from openmm_cylchain import InputError, Plane, Slab, Sphere, analysis
 from openmm_cylchain.cli import main
 from openmm_cylchain.couplings.shapes import Box, Cylinder, Ellipsoid
-from openmm_cylchain.output.colors import colors_of_filaments
+from openmm_cylchain.output.colors import PLUS_END_COLOR, colors_of_filaments
 from openmm_cylchain.rendering.annotations import Margins, clock_text, margins, scale_bar_length
 from openmm_cylchain.rendering.camera import camera_on
-from openmm_cylchain.rendering.colors import PLUS_END_COLOR, filament_colors, linker_colors
+from openmm_cylchain.rendering.colors import filament_colors, linker_colors
 from openmm_cylchain.rendering.pictures import View, images, write_film
 from openmm_cylchain.rendering.scene import COLORINGS, Look, has_polarity, make_scene
+from openmm_cylchain.runs.configuration import parse_configuration
+from openmm_cylchain.runs.description import describe
+from openmm_cylchain.runs.run import create_simulation
 from support.small_runs import AMONG_SPHERES, NETWORK, TWO_LOADS, TWO_TYPES, simulated
 
 SIZE = ["--size", "160x120"]
@@ -79,6 +82,18 @@ def test_loads_have_colors(tmp_path):
     content = json.loads(exported(path, tmp_path, "simularium"))
     names = [own["name"] for own in content["trajectoryInfo"]["typeMapping"].values()]
     assert names == list(filament_colors(run))
+
+
+def test_loads_are_those_of_all_pulls():
+    pulls = '[[pull]]\nfilament = [0, 1]\ntension = "0.2 pN"\n'
+    pulls += '[[pull]]\nfilament = [1, 2]\nnode = -1\nforce = ["0.3 pN", "0 pN", "-0.4 pN"]\n[simulation]'
+    first, rest = TWO_LOADS.replace("count = 2", "count = 3").split("[[pull]]", 1)
+    text = first + pulls + rest.split("[simulation]")[1]
+    configuration = parse_configuration(text)
+    simulation, built = create_simulation(configuration)
+    description = describe(configuration, built.filaments, built.system, simulation.topology)
+    expected = ["0.2 pN", "0.2 pN + 0.5 pN on node -1", "0.5 pN on node -1", "no pull"]
+    assert [own.load for own in description.filaments] == expected
 
 
 def exported(run, tmp_path, kind):

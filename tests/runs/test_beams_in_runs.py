@@ -31,6 +31,7 @@ from openmm_cylchain.runs.summary import group_labels, load_trajectory, summaris
 from openmm_cylchain.units.quantities import PICONEWTON
 from support.configurations import BEAMS
 from support.contexts import positions_of
+from support.run_figures import rendered
 from support.small_runs import simulated
 
 SHORT_ELEMENT = {
@@ -48,7 +49,8 @@ PARTICLES = 2 * (2 * 4 + 3 + 3 + 4) + 3
 
 @pytest.fixture(scope="module")
 def unbroken(tmp_path_factory):
-    return simulated(tmp_path_factory.mktemp("beams"), BEAMS)
+    with rendered():
+        return simulated(tmp_path_factory.mktemp("beams"), BEAMS)
 
 
 def chains_of(filaments, positions):

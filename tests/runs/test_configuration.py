@@ -171,6 +171,16 @@ def test_intervals_may_carry_rounding_errors():
         ({"filament": FILAMENT + FILAMENT.replace("[[filament]]", "[filament]")}, ["[filament] has come before"]),
         ({"top": "a = { b = 1, b = 2 }\n"}, ["line 1: the key 'b' stands twice between the same braces"]),
         ({"top": "temperature = 310\n"}, ["unknown key 'temperature'", "belongs to [solvent]"]),
+        ({"filament": FILAMENT + "count = 1979-05-27\n"}, ["count must be a whole number, but is 1979-05-27."]),
+        ({"filament": FILAMENT + "count = [true, {}]\n"}, ["count must be a whole number, but is [true, {}]."]),
+        (
+            {"filament": FILAMENT + FILAMENT.replace("[filament]", "[simulation.filament]")},
+            ["'filament'. It is a table of its own: write [[filament]]."],
+        ),
+        (
+            {"simulation": SIMULATION.replace('"10 ns"', '"1e-4 ps"')},
+            ["report_interval makes 1e+10 steps from report to report"],
+        ),
         ({"solvent": SOLVENT.replace("solvent", "solvents")}, ["unknown key 'solvents'", "Did you mean 'solvent'"]),
         ({"solvent": ""}, ["[solvent]", "lacks the key 'temperature'", '"310 K"']),
         ({"solvent": "solvent = 3\n"}, ["'solvent' must be a table"]),

@@ -11,9 +11,11 @@ from openmm_cylchain.output.colors import spring_colors
 from openmm_cylchain.rendering.colors import filament_colors, linker_colors
 from support.small_runs import NETWORK, TWO_LOADS, simulated
 
+pytestmark = pytest.mark.usefixtures("rendered_figures_of_runs")
+
 
 @pytest.fixture(scope="module")
-def drawn(tmp_path_factory):
+def drawn(tmp_path_factory, rendered_figures_of_runs):
     """The axes of the figure of a network of filaments of two lengths, and its run."""
     figures, savefig = [], Figure.savefig
 

@@ -1,9 +1,9 @@
 """Tables of configurations beyond filaments and linkers: what is built is what Python builds, and what is refused."""
 
+import functools
 import itertools
 import re
 import sys
-from types import SimpleNamespace
 
 import mdtraj
 import numpy as np
@@ -31,6 +31,7 @@ from openmm_cylchain import (
     theory,
     wall_force,
 )
+from openmm_cylchain.output.progress import LateMessages
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
 from openmm_cylchain.runs.initial_state import build_system
 from openmm_cylchain.runs.relaxation import relaxed_positions
@@ -376,8 +377,8 @@ TWO_IN_A_SPHERE = FILAMENT + 'count = 2\ninside = { shape = "sphere", radius = "
 
 def test_a_start_that_takes_long_says_how_far_it_is(monkeypatch, capsys):
     # Of 140 steps each takes an eighth of a second here, so that lines come after 2, 4, 6, 9 and 13.5 s.
-    clock = SimpleNamespace(monotonic=itertools.count(0.0, 0.125).__next__)
-    monkeypatch.setattr("openmm_cylchain.runs.relaxation.time", clock)
+    clocked = functools.partial(LateMessages, clock=itertools.count(0.0, 0.125).__next__)
+    monkeypatch.setattr("openmm_cylchain.runs.relaxation.LateMessages", clocked)
     configuration = parse(CONTACTS, filament=TWO_IN_A_SPHERE)
     one, messages = build_system(configuration, None, 3), []
     relaxed_positions(configuration, one, messages.append)

@@ -15,6 +15,7 @@ from openmm_cylchain.runs.run import begin, check_step, create_simulation
 from openmm_cylchain.runs.run_directory import RunDirectory
 from openmm_cylchain.runs.summarised_run import run_with_summary
 from openmm_cylchain.runs.tables.shapes import REGION, Region
+from support.run_figures import rendered
 
 SOLVENT = '[solvent]\ntemperature = "300 K"\nviscosity = "1 mPa*s"\n'
 BOX = '[box]\nedges = ["600 nm", "600 nm", "600 nm"]\n'
@@ -46,7 +47,8 @@ def linkers(rates, more, name="m", reach=50):
 
 
 def test_a_run_of_joints_too_stiff_for_a_grid_of_angles_has_its_figure(tmp_path):
-    groups, *_ = run_with_summary(parsed(filament=STIFF), tmp_path / "out")
+    with rendered():
+        groups, *_ = run_with_summary(parsed(filament=STIFF), tmp_path / "out")
     assert groups and (tmp_path / "out" / "summary.png").stat().st_size > 10**4
 
 
@@ -132,7 +134,7 @@ def test_linkers_are_bound_where_overlaps_have_come_apart(reach, found):
 def test_linkers_that_would_do_too_much_in_a_step_are_refused(rates, more, message):
     few = linkers('binding_rate = "1 1/s", unbinding_rate = "1e13 1/s"', "count = 1", "few")
     for call in (create_simulation, check_step):
-        with pytest.raises(InputError, match=rf"^\[\[linkers\]\] number 2: .*{message}"):
+        with pytest.raises(InputError, match=rf"^line 16: \[\[linkers\]\] number 2: .*{message}"):
             call(parsed(BOX, few, linkers(rates, more)))
 
 
@@ -308,3 +310,36 @@ def test_trajectories_of_one_run_are_the_same_whenever_they_were_written(tmp_pat
             run_with_summary(parsed(), tmp_path / f"{date:g}")
         found.append((tmp_path / f"{date:g}" / "trajectory.dcd").read_bytes())
     assert found[0] == found[1]
+
+
+FENE = '[[link]]\nbetween = [{ filament = 0, node = 0 }, { filament = 1, node = 0 }]\nstiffness = "1 pN/nm"\n'
+FENE += 'rest_length = "1 nm"\nmodel = "fene"\nmaximum_extension = "2 nm"\n'
+ITSELF = '[[link]]\nbetween = [{ filament = 0, node = 0 }, { filament = 0, node = 0 }]\nstiffness = "1 pN/nm"\n'
+RANDOM = '[[link]]\nwithin = "{}"\nstiffness = "1 pN/nm"\n'
+WALL = '[[wall]]\nshape = "sphere"\nradius = "70 nm"\nstiffness = "1 pN/nm"\n'
+NARROW = '{ shape = "sphere", radius = "90 nm" }'
+SITES = 'binding_rate = "1 1/s", unbinding_rate = "1 1/s", site_spacing = "300 nm"'
+
+
+@pytest.mark.parametrize(
+    ("before", "table", "at_fault", "message"),
+    [
+        (BOX, linkers(SITES, "count = 9\nbound = 9"), "[[linkers]]", "Linkers 'm': 9 are to begin bound"),
+        (BOX, FENE, "[[link]]", "[[link]] number 1: begins with a length of"),
+        ("", ITSELF, "[[link]]", "[[link]] number 1: Crosslink 0 joins particle 0 to itself."),
+        (BOX, RANDOM.format("400 nm"), "within", "[[link]] number 1: within must be less than half"),
+        ("", RANDOM.format("90 nm") + 'spacing = "0.01 pm"\n', "spacing", "[[link]] number 1: spacing makes 8e+07"),
+        ("", RANDOM.format("9 um") + 'spacing = "0.1 nm"\n', "[[link]]", "[[link]] number 1: within is 9000 nm, where"),
+        (BOX.replace("600", "210"), CONTACTS, "[contacts]", "[contacts] The periodic box is"),
+        (BOX + PARTICLES, WALL, "radius", "[[wall]] number 1: a particle with a radius of 75 nm does not fit"),
+        ("", ACTIN + f"inside = {NARROW}\n", "inside", "[[filament]] number 2: filament 2 of 4 segments does not fit"),
+        ("", "", "platform", "[simulation] platform must be one of those that OpenMM has loaded"),
+    ],
+)
+def test_what_is_built_is_refused_with_file_and_line(tmp_path, capsys, before, table, at_fault, message):
+    file = tmp_path / "run.toml"
+    platform = "SLIDE_RULE" if at_fault == "platform" else "CPU"
+    file.write_text(f'{SOLVENT}{ACTIN}{before}{table}{SIMULATION}platform = "{platform}"\n')
+    assert main(["run", str(file), "--dry-run"]) == 2
+    line = 1 + [line.startswith(at_fault) for line in file.read_text().splitlines()].index(True)
+    assert capsys.readouterr().err.splitlines()[-1].startswith(f"error: {file}, line {line}: {message}")

@@ -132,7 +132,7 @@ def test_dry_run_and_wrong_options(tmp_path, capsys):
     for options, message in (
         ([], "--output DIR"),
         (["--output", path], "is a file"),
-        (["--output", str(tmp_path), "--workers", "0"], "workers must be a whole number"),
+        (["--output", str(tmp_path), "--workers", "0"], "workers must be at least 1"),
         (["--output", str(tmp_path), "--executor", "dask"], "--scheduler ADDRESS"),
         (["--output", str(tmp_path), "--workers", "2", "--executor", "mpi"], "has workers of its own"),
     ):
@@ -213,7 +213,9 @@ def test_failures_are_named_and_the_others_gathered(tmp_path, capsys):
     assert "failed" in statuses
 
 
-@pytest.mark.parametrize(("setting", "threads"), [("", "2 threads"), ("threads = 1", "1 thread")])
+@pytest.mark.parametrize(
+    ("setting", "threads"), [("", "2 threads"), pytest.param("threads = 1", "1 thread", marks=pytest.mark.slow)]
+)
 def test_threads_of_a_run_elsewhere(tmp_path, monkeypatch, setting, threads):
     """Those of the environment of a worker, if the file does not say how many."""
     monkeypatch.setenv("OPENMM_CPU_THREADS", "2")

@@ -163,6 +163,7 @@ class Simulation:
         positions = filaments.add_to(topology, system, particles.reshape(-1, 3).tolist())
         # Several sets divide the links among several forces.
         self.crosslinks = [potential.crosslinks() for _ in range(sets)]
+        pairs = [[] for _ in range(sets)]
         for copy in range(copies):
             for number, link in enumerate(network.links):
                 ends = []
@@ -178,8 +179,9 @@ class Simulation:
                                 copy * network.filaments + place[0], segment=segment, fraction=fraction
                             )
                         )
-                self.crosslinks[number % sets].add(None, *ends)
-        for one in self.crosslinks:
+                pairs[number % sets].append(ends)
+        for one, own in zip(self.crosslinks, pairs):
+            one.add_many(None, own)
             one.add_to(system)
         self.integrator = filaments.create_integrator(
             system, step, scheme=scheme, temperature=temperature, particle_friction=PARTICLE_FRICTION,

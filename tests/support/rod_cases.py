@@ -32,7 +32,7 @@ def rods_between_walls(stiffness):
 
 def quadrature_between_walls(system):
     """What ``rod_observables.observe`` means of a rod of fixed length between walls, without contacts."""
-    cosines = (np.arange(2000) + 0.5) / 2000
+    cosines = (np.arange(1000) + 0.5) / 1000
     heights = np.linspace(-80.0, system.height + 80.0, 5201)
     ends = heights[:, None] + 0.5 * system.length * np.array([-1.0, 1.0])[:, None, None] * cosines
     depths = np.maximum(np.maximum(-ends, ends - system.height), 0.0)

@@ -95,7 +95,7 @@ def test_recommended_step_of_actin_is_right():
     assert gains["ACT bending mode 1, change"] > 2 and gains["ACT middle, displacement"] > 2, gains
 
 
-@pytest.mark.parametrize("rate, parts", [(0.1, 16), (0.6, 16), (1.0, 16), (0.6, 2)])
+@pytest.mark.parametrize("rate, parts", [(0.1, 16), pytest.param(0.6, 16, marks=pytest.mark.slow), (1.0, 16), (0.6, 2)])
 def test_error_of_a_spring_is_that_of_theory(rate, parts):
     filaments, system, positions = bound_particles(300)
     # Two particles of friction one relax with 2 k.

@@ -11,12 +11,14 @@ from openmm import app, unit
 from openmm_cylchain import (
     DSDNA_BASE_PAIRS,
     F_ACTIN,
+    Attachment,
     Box,
     ConstantVelocityPulling,
     Crosslinker,
     CrosslinkReporter,
     Crosslinks,
     CrosslinkTable,
+    EndCorrections,
     FilamentReporter,
     Filaments,
     FilamentType,
@@ -25,21 +27,34 @@ from openmm_cylchain import (
     Joints,
     LinkerReporter,
     LinkerTable,
+    RunReporter,
+    SegmentFriction,
     Sphere,
     TensionReporter,
+    Tether,
     TetherReporter,
+    TimeStep,
+    analysis,
     capsule_contact_force,
+    check_time_step,
     constant_force,
     constant_tension,
     contact_force,
     contact_forces,
     crossing_barrier,
     effective_rate,
+    enable_platform,
     excluded_pairs,
+    fene_steps,
     filament_wall_force,
+    find_contacts,
+    make_trajectory_whole,
     random_points_on,
     recommended_time_step,
+    remove_jumps,
+    scans,
     share_exclusions,
+    stability_bounds,
     theory,
     time_step_bounds,
     wall_force,
@@ -78,9 +93,10 @@ def test_arguments_are_shown_on_one_short_line(filaments):
 @pytest.mark.parametrize("planar", [False, True])
 def test_positions_beyond_all_measure(filaments, planar):
     nodes = np.array([[0.0, 0, 0], [360, 0, 0], [720, 0, 0]])
-    for far in (1e18, 1e200):
-        with pytest.raises(InputError, match=r"up to 1e\+(18|200) nm from the origin. Beyond 1e\+12 nm"):
-            filaments.add_nodes(F_ACTIN, nodes + [0, 0, far], planar=planar)
+    with pytest.raises(InputError, match=r"up to 1e\+18 nm from the origin. Beyond 1e\+12 nm"):
+        filaments.add_nodes(F_ACTIN, nodes + [0, 0, 1e18], planar=planar)
+    with pytest.raises(InputError, match=r"positions must be between 1e-60 and 1e\+60 in .*, but is 1e\+200"):
+        filaments.add_nodes(F_ACTIN, nodes + [0, 0, 1e200], planar=planar)
     for wrong in (-np.inf, np.nan):
         with pytest.raises(InputError, match="positions must be finite"):
             filaments.add_nodes(F_ACTIN, nodes + [0, 0, wrong], planar=planar)
@@ -176,6 +192,9 @@ def test_a_filament_type_without_mass():
 
 RATES = {"binding_rate": 1e-11, "reach": 60.0, "unbinding_rate": 1e-12}
 HAND = Hand(**RATES)
+BEAM = FilamentType(
+    name="BEAM", diameter=7.0, segment_length=300.0, bending_rigidity=4e4, stretching_modulus=1e4, element="beam"
+)
 LINKER = Crosslinker(hands=HAND, stiffness=0.1)
 
 
@@ -260,8 +279,96 @@ def _built():
         (lambda f, s: theory.bead_spring_mean_lengths(DSDNA_BASE_PAIRS, 10**10, 300.0), "bonds must be at most"),
         (lambda f, s: theory.bead_spring_mean_lengths(DSDNA_BASE_PAIRS, 4, 300.0, None), "planar must be True or"),
         (lambda f, s: write_psf(app.Topology(), "none.psf", system=3), "system must be an object of the class System"),
+        (lambda f, s: f[2], "Filament 2 does not exist; there are 2"),
+        (lambda f, s: f["0"], "The number of a filament must be a whole number, but is '0'"),
+        (lambda f, s: _new().add_beads(0, 1e-6), r"Beads of filament 0: spacing is 1e-06 nm, .* at most 1e\+06"),
+        (lambda f, s: _new().add_nodes(BEAM, np.zeros((3, 3))), "nodes 0 and 1 coincide"),
+        (lambda f, s: _new().add_nodes(BEAM, [[0, 0, 0], [9, 0, 0], [0, 0, 0]]), "turn back at node 1"),
+        (lambda f, s: EndCorrections(rotational=np.nan), "EndCorrections: rotational must be finite"),
+        (lambda f, s: EndCorrections([0.1, 0.2]), "EndCorrections: parallel must be a single number"),
+        (lambda f, s: SegmentFriction(1.0, np.nan, 1.0, 1.0), "SegmentFriction: perpendicular must be finite"),
+        (lambda f, s: TimeStep(np.nan, "", {}), "TimeStep: step must be finite"),
+        (lambda f, s: TimeStep(1.0, "", None), "TimeStep: bounds must be an object of the class dict"),
+        (lambda f, s: Tether(0, 0, (0.0, np.nan, 0.0), 1.0), "Tether: point must be finite"),
+        (lambda f, s: Attachment(0, 0, 2.0), "Attachment: fraction must be a number between 0 and 1"),
+        (lambda f, s: dataclasses.replace(f[0], closed=None), "Filament: closed must be True or False"),
+        (lambda f, s: F_ACTIN.segment_lengths(2**31), "segments must be at most 100000000"),
+        (lambda f, s: F_ACTIN.bending_energy(2.0), "cosine must be between -1 and 1"),
+        (lambda f, s: F_ACTIN.stretching_energy("a"), "length must be a number or an array"),
+        (lambda f, s: F_ACTIN.draw_chain(3, 300.0, 1), "generator must be an object of the class Generator"),
+        (lambda f, s: DSDNA_BASE_PAIRS.bending_energies(np.eye(3), [1.0]), r"stiffnesses must have the shape \(2,\)"),
+        (lambda f, s: F_ACTIN.bending_energies(np.zeros((3, 3))), "vectors: segment 0 has no length"),
+        (lambda f, s: Sphere((0, 0, 0), 1.0).depths(3.0), r"positions must have the shape \(..., 3\)"),
+        (lambda f, s: FilamentReporter(None, 2**31, f), "reportInterval must be at most 2147483647"),
+        (lambda f, s: FilamentReporter(None, 5, f, append=np.eye(2)), "append must be True or False"),
+        (lambda f, s: FilamentReporter("/none/file.csv", 5, f), "/none, which is not a directory"),
+        (lambda f, s: TensionReporter(None, 5, f, joints=None), "joints must be True or False"),
+        (lambda f, s: TensionReporter(None, 5, f, mean=1), "mean must be True or False"),
+        (lambda f, s: FilamentReporter(None, 5, f)[[]], r"There is no column \[\]"),
+        (lambda f, s: RunReporter("run", 5, f, walls=None), "walls must be a sequence of Shapes"),
+        (lambda f, s: RunReporter("run", 5, f, particle_diameters=np.eye(2)), "particle_diameters must have lengths"),
+        (lambda f, s: write_psf(f.build, None), "topology must be an openmm.app.Topology"),
+        (lambda f, s: write_psf(app.Topology(), None), "file must be a path, but is None"),
+        (lambda f, s: make_trajectory_whole(None), "trajectory must be an mdtraj.Trajectory"),
+        (lambda f, s: remove_jumps(app.Topology()), "trajectory must be an mdtraj.Trajectory"),
+        (lambda f, s: Crosslinks.from_system(None), "system must be an object of the class System"),
+        (lambda f, s: Crosslinks.of_force(None), "force must be an object of the class Force"),
+        (lambda f, s: Crosslinks(1.0, 1.0).thermal_stiffness(3, 300.0), "table must be an object of the class Cross"),
+        (lambda f, s: Crosslinks(1.0, 1.0).set_pairs(3, [[0, 1]]), "are not in a System yet"),
+        (lambda f, s: Crosslinks(1.0, 1.0).set_pairs(None, "abc"), r"pairs must have the shape \(n, 2\)"),
+        (lambda f, s: CrosslinkTable(**COLUMNS).switched([0], None), "active must be True or False"),
+        (lambda f, s: CrosslinkTable(**COLUMNS).displacements([[0, 0, 0]]), "hold particle 1"),
+        (lambda f, s: CrosslinkTable(**COLUMNS).displacements(np.eye(3), 3.0), "box must be three vectors"),
+        (lambda f, s: CrosslinkTable(**COLUMNS).save(None), "file must be a path, but is None"),
+        (lambda f, s: CrosslinkTable.load(__file__), "holds no table of crosslinks"),
+        (lambda f, s: CrosslinkTable.load("/none/file.npz"), "file /none/file.npz does not exist"),
+        (lambda f, s: capsule_contact_force(f, s, 9.0, excluded_neighbors=2**31), "excluded_neighbors must be at most"),
+        (lambda f, s: find_contacts(None, None), "force must be one of capsule_contact_force"),
+        (lambda f, s: fene_steps(F_ACTIN, F_ACTIN.segment_friction(602.0, 300.0), 300.0), "are those of 'fene'"),
+        (lambda f, s: stability_bounds(None, 602.0, 300.0), "filament_type must be an object"),
+        (lambda f, s: recommended_time_step(DSDNA_BASE_PAIRS, 602.0, np.nan), "temperature must be finite"),
+        (lambda f, s: enable_platform([]), "platform must be one of OpenCL"),
+        (lambda f, s: check_time_step(f, s, None, 1.0), "positions must be a number or an array"),
+        (lambda f, s: check_time_step(f, s, np.zeros((8, 3)), 1.0), "filament 0: nodes 0 and 1 coincide"),
+        (lambda f, s: theory.chain_mean_square_end_to_end(F_ACTIN, 10**9, 300.0), r"segments must be at most 1e\+07"),
+        (lambda f, s: theory.chain_extension(F_ACTIN, 10**9, 1.0, 300.0), r"segments must be at most 1e\+05"),
+        (lambda f, s: theory.chain_extension(F_ACTIN, 9, 1e9, 300.0), "too strongly aligned"),
+        (lambda f, s: theory.wlc_relative_extension(1e12, 50.0, 300.0), "too strong for this sum"),
+        (lambda f, s: theory.chain_mean_energies(None, 3, 300.0), "filament_type must be an object"),
+        (lambda f, s: theory.mean_joint_cosine(F_ACTIN, 300.0, "no"), "planar must be True or False"),
+        (lambda f, s: theory.wlc_tangent_correlation(1.0, 1.0, 3), "planar must be True or False"),
+        (lambda f, s: theory.marko_siggia_extension(1e300, 50.0, 300.0), "force must be between"),
+        (lambda f, s: theory.mean_orientation(1.0, None, 300.0), "friction must be an object"),
+        (lambda f, s: theory.bead_spring_mode_variances(DSDNA_BASE_PAIRS, 4, "a", 300.0), "modes must be a sequence"),
+        (lambda f, s: analysis.stress(None, 0), "run must be a Run, as analysis.load returns it"),
+        (lambda f, s: analysis.load(None), "path must be a path, but is None"),
+        (lambda f, s: analysis.order_parameter("a"), "vectors must be a number or an array"),
+        (lambda f, s: analysis.find_crossings(3, np.eye(3), np.eye(3)), "chains must be int arrays"),
+        (lambda f, s: analysis.statistics.autocorrelation(np.arange(9.0), [1, 2]), "mean must broadcast"),
+        (lambda f, s: scans.read_scan([]), "path must be a path"),
     ],
 )
 def test_wrong_calls_are_refused_in_words(call, message):
     with pytest.raises(InputError, match=message):
         call(*_built())
+
+
+def test_crosslinks_are_those_of_one_system():
+    platform, contexts, owned = openmm.Platform.getPlatform("Reference"), [], []
+    for _ in range(2):
+        filaments, system = _built()
+        links = Crosslinks(1.0, 1.0)
+        links.add_to(system)
+        contexts.append(openmm.Context(system, filaments.create_integrator(system, 1.0), platform))
+        owned.append(links)
+    owned[1].add(contexts[1], 0, 5)
+    with pytest.raises(InputError, match="System that does not have these crosslinks. .* Crosslinks.from_system"):
+        owned[0].table(contexts[1])
+    assert len(Crosslinks.from_system(contexts[1].getSystem())[0].table(contexts[1])) == 1
+
+
+def test_fene_forces_do_not_turn_beyond_the_largest_extension():
+    kind = dataclasses.replace(F_ACTIN, stretching_model="fene", maximum_extension=30.0)
+    forces = kind.stretching_derivative(kind.segment_length + np.array([-40.0, -30.0, 29.0, 30.0, 40.0]))
+    np.testing.assert_array_equal(np.isinf(forces), [True, True, False, True, True])
+    assert np.all(np.sign(forces) == [-1, -1, 1, 1, 1])

@@ -12,7 +12,7 @@ from ...kinetics.hand import AT_ENDS, Hand
 from ...kinetics.linkers import as_linkers
 from ...kinetics.presets import PRESETS
 from ...units import quantities as units
-from ..keys import REQUIRED, Choice, Flag, Inline, Key, Number, Pair, Quantity, Text, Whole, point
+from ..keys import REQUIRED, Choice, Flag, Inline, Key, Number, Pair, Quantity, Text, Whole, as_written, point
 from ..table import Entries, TableKind
 from .filament_types import PRESETS as FILAMENT_PRESETS
 from .shapes import volume_within
@@ -41,7 +41,8 @@ class _Names:
         names = [value] if isinstance(value, str) else value
         if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
             raise place.error(
-                f'must be a name of a type of filaments, or a list of them, as in ["F_ACTIN"], but is {names!r}.'
+                'must be a name of a type of filaments, or a list of them, as in ["F_ACTIN"], but is '
+                f"{as_written(names)}."
             )
         return tuple(FILAMENT_PRESETS[name].name if name in FILAMENT_PRESETS else name for name in names)
 
@@ -71,7 +72,7 @@ class _Anchors:
             return tuple(value)
         for index, own in enumerate(value):
             if not isinstance(own, list) or len(own) != 3:
-                raise place.item(index).error(f"must be a point, as in {self.example}, but is {own!r}.")
+                raise place.item(index).error(f"must be a point, as in {self.example}, but is {as_written(own)}.")
         return tuple(point().read(own, place.item(index)) for index, own in enumerate(value))
 
     def schema(self):

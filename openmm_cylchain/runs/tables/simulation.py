@@ -13,6 +13,7 @@ from ..table import TableKind
 PRECISIONS = ("automatic", "single", "mixed", "double")
 """Those of filaments with the compiled engine, and those of platforms. The default, "automatic", chooses for them."""
 _MOST_STEPS = 10**15
+_MOST_STEPS_PER_REPORT = 2**31 - 1  # That a DCD file can say.
 
 SIMULATION = TableKind(
     "simulation",
@@ -80,6 +81,11 @@ def read_simulation(entries, recommended):
     else:
         time_step = entries["time_step"]
     steps_per_report = _multiple(entries.at("report_interval"), report, "time_step", time_step)
+    if steps_per_report > _MOST_STEPS_PER_REPORT:
+        raise entries.at("report_interval").error(
+            f"makes {steps_per_report:.3g} steps from report to report, of {format_time(time_step)}: there can be "
+            f"{_MOST_STEPS_PER_REPORT:.2g}. Take a longer time_step or a shorter interval."
+        )
     reports = _multiple(entries.at("duration"), entries["duration"], "report_interval", report)
     reports_per_checkpoint = 10
     if entries["checkpoint_interval"] is not None:

@@ -70,8 +70,11 @@ void CylinderChainForceImpl::updateParametersInContext(ContextImpl& context) {
     context.systemChanged();
 }
 
-void CylinderChainForceImpl::haveGrown(ContextImpl& context) {
-    kernel.getAs<CalcCylinderChainForceKernel>().copyParametersToContext(context);
+void CylinderChainForceImpl::haveGrown(ContextImpl& context, const vector<int>& numbers) {
+    vector<int> changed(numbers);
+    for (int& number : changed)
+        number = description->getList().getIndex(number);
+    kernel.getAs<CalcCylinderChainForceKernel>().replaceChains(context, changed);
 }
 
 void CylinderChainForceImpl::computeEnergies(ContextImpl& context, double& stretching, double& bending) {

@@ -94,8 +94,12 @@ int CylinderChainGrowthForce::addGrowingChain(int chain, int table, int pool, in
             " has fewer monomers than it can have, or can have less than two");
     for (double rate : {minusOnRate, minusOffRate, plusOnRate, plusOffRate})
         require(isRate(rate), "The rates of chain "+to_string(chain)+" cannot be negative and must be finite");
-    system.chains.push_back({chain, table, pool, leastMonomers, {{minusOnRate, minusOffRate},
-            {plusOnRate, plusOffRate}}});
+    GrowingChain own = {chain, table, pool, leastMonomers, {}};
+    own.ends[0].onRate = minusOnRate;
+    own.ends[0].offRate = minusOffRate;
+    own.ends[1].onRate = plusOnRate;
+    own.ends[1].offRate = plusOffRate;
+    system.chains.push_back(own);
     ranges.push_back({firstMonomer, lastMonomer});
     return system.chains.size()-1;
 }
@@ -117,10 +121,35 @@ void CylinderChainGrowthForce::getGrowingChainParameters(int index, int& chain, 
     plusOffRate = own.ends[1].offRate;
 }
 
+void CylinderChainGrowthForce::setDynamicInstability(int index, int end, double shrinkingOnRate,
+        double shrinkingOffRate, double catastropheRate, double rescueRate) {
+    ASSERT_VALID_INDEX(index, system.chains);
+    require(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
+    for (double rate : {shrinkingOnRate, shrinkingOffRate, catastropheRate, rescueRate})
+        require(isRate(rate), "The rates of chain "+to_string(system.chains[index].chain)+" cannot be negative and "
+                "must be finite");
+    GrowingEnd& own = system.chains[index].ends[end];
+    own.shrinking = {shrinkingOnRate, shrinkingOffRate};
+    own.catastropheRate = catastropheRate;
+    own.rescueRate = rescueRate;
+}
+
+void CylinderChainGrowthForce::getDynamicInstability(int index, int end, double& shrinkingOnRate,
+        double& shrinkingOffRate, double& catastropheRate, double& rescueRate) const {
+    ASSERT_VALID_INDEX(index, system.chains);
+    require(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
+    const GrowingEnd& own = system.chains[index].ends[end];
+    shrinkingOnRate = own.shrinking.onRate;
+    shrinkingOffRate = own.shrinking.offRate;
+    catastropheRate = own.catastropheRate;
+    rescueRate = own.rescueRate;
+}
+
 GrowthState CylinderChainGrowthForce::getState() const {
     GrowthState state;
     state.ranges = ranges;
     state.events.resize(2*ranges.size());
+    state.shrinks.assign(2*ranges.size(), 0);
     for (const MonomerPool& pool : system.pools)
         state.free.push_back(llround(pool.concentration*pool.volume));
     return state;
@@ -152,18 +181,20 @@ void CylinderChainGrowthForce::setMonomers(ChainList& chains, set<int>& growing)
     }
 }
 
-void CylinderChainGrowthForce::getGrowthInContext(Context& context, vector<int>& ends, vector<double>& parameters,
-        vector<double>& loads) const {
+void CylinderChainGrowthForce::getGrowthInContext(Context& context, vector<int>& ends, vector<int>& numbers,
+        vector<double>& parameters, vector<double>& loads) const {
     const CylinderChainGrowthForceImpl& impl =
             dynamic_cast<const CylinderChainGrowthForceImpl&>(getImplInContext(context));
     const GrowthState& state = impl.getState();
     ends.clear();
     parameters.clear();
     loads.clear();
+    numbers.assign(state.shrinks.begin(), state.shrinks.end());
     for (const MonomerRange& range : state.ranges)
         ends.insert(ends.end(), {range.first, range.last});
     for (const EndEvents& own : state.events)
-        parameters.insert(parameters.end(), {(double) own.gained, (double) own.lost, (double) own.waited});
+        parameters.insert(parameters.end(), {(double) own.gained, (double) own.lost, (double) own.waited,
+                (double) own.catastrophes, (double) own.rescues});
     for (size_t i = 0; i < system.pools.size(); i++)
         loads.push_back(system.pools[i].isClosed() ? state.free[i]/system.pools[i].volume :
                 system.pools[i].concentration);

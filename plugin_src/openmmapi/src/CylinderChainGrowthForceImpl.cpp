@@ -37,6 +37,8 @@ static double digestOf(const GrowthState& state) {
         mix((uint32_t) range.first);
         mix((uint32_t) range.last);
     }
+    for (char shrinks : state.shrinks)
+        mix(shrinks != 0 ? 1 : 0);
     return (double) (digest>>12);
 }
 
@@ -187,7 +189,10 @@ void CylinderChainGrowthForceImpl::updateContextState(ContextImpl& context, bool
             to_string(failed == -1 ? -1 : growing[failed])+": use a smaller step, or look at the rates");
     if (changed.empty())
         return;
-    chains->haveGrown(context);
+    vector<int> numbers(changed);
+    for (int& number : numbers)
+        number = growing[number];
+    chains->haveGrown(context, numbers);
     for (CouplingForceImpl* coupling : couplings)
         coupling->chainsHaveGrown(context, list);
     const bool otherNodes = any_of(changed.begin(), changed.end(), [&] (int i) {
@@ -220,7 +225,7 @@ void CylinderChainGrowthForceImpl::refuseForces(const vector<Vec3>& forces) cons
 
 void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
     const GrowthSystem& system = owner.getSystem();
-    require(replaced.ranges.size() == growing.size() && replaced.events.size() == 2*growing.size() &&
+    require(replaced.ranges.size() == growing.size() && replaced.events.size() == 2*growing.size() && replaced.shrinks.size() == 2*growing.size() &&
             replaced.free.size() == system.pools.size(), "A State or checkpoint has the growth of another number of "
             "chains or pools");
     ChainList& list = chains->getGrowingList();
@@ -237,7 +242,7 @@ void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
     state = replaced;
     for (size_t i = 0; i < growing.size(); i++)
         cylchain::setMonomers(list.getChain(growing[i]), system.tables[system.chains[i].table], state.ranges[i]);
-    chains->haveGrown(*context);
+    chains->haveGrown(*context, growing);
     setSpareNodes();
     for (CouplingForceImpl* coupling : couplings)
         coupling->chainsHaveGrown(*context, list);
@@ -265,9 +270,10 @@ StateColumns CylinderChainGrowthForceImpl::storeState(bool inCheckpoint) {
     for (const MonomerRange& range : now.ranges)
         ends.insert(ends.end(), {range.first, range.last});
     for (const EndEvents& own : now.events)
-        events.insert(events.end(), {own.gained, own.lost, own.waited});
+        events.insert(events.end(), {own.gained, own.lost, own.waited, own.catastrophes, own.rescues});
     columns.put("ends", ends);
     columns.put("events", events);
+    columns.put("shrinks", vector<int>(now.shrinks.begin(), now.shrinks.end()));
     columns.put("free", now.free);
     columns.put("steps", now.steps);
     if (inCheckpoint)
@@ -283,8 +289,10 @@ void CylinderChainGrowthForceImpl::restoreState(const StateColumns& columns) {
     replaced.free = columns.get<long long>("free");
     for (size_t i = 0; i+1 < ends.size(); i += 2)
         replaced.ranges.push_back({ends[i], ends[i+1]});
-    for (size_t i = 0; i+2 < events.size(); i += 3)
-        replaced.events.push_back({events[i], events[i+1], events[i+2]});
+    for (size_t i = 0; i+4 < events.size(); i += 5)
+        replaced.events.push_back({events[i], events[i+1], events[i+2], events[i+3], events[i+4]});
+    for (int one : columns.get<int>("shrinks"))
+        replaced.shrinks.push_back(one != 0);
     setState(replaced);
     if (columns.has("seed"))
         seed = columns.getOne<uint32_t>("seed");

@@ -44,7 +44,7 @@ static bool isPeriodic(const System& system) {
             box[2] != Vec3(0, 0, 2);
 }
 
-static const CylinderChainGrowthForceImpl* findGrowth(const ContextImpl& context) {
+static const CylinderChainGrowthForceImpl* findGrowth(ContextImpl& context) {
     for (const ForceImpl* impl : context.getForceImpls())
         if (dynamic_cast<const CylinderChainGrowthForceImpl*>(impl) != NULL)
             return dynamic_cast<const CylinderChainGrowthForceImpl*>(impl);

@@ -10,6 +10,9 @@ using namespace std;
 
 /** The names of the rates of a chain, in their order. */
 static const char* const RATES[] = {"minusOnRate", "minusOffRate", "plusOnRate", "plusOffRate"};
+/** Those of an end that has dynamic instability. */
+static const char* const RATES_OF_INSTABILITY[] = {"shrinkingOnRate", "shrinkingOffRate", "catastropheRate",
+        "rescueRate"};
 
 static void write(const CylinderChainGrowthForce& force, SerializationNode& node) {
     SerializationNode& tables = node.createChildNode("Tables");
@@ -41,6 +44,12 @@ static void write(const CylinderChainGrowthForce& force, SerializationNode& node
                 .setIntProperty("lastMonomer", last).setIntProperty("leastMonomers", least);
         for (int k = 0; k < 4; k++)
             own.setDoubleProperty(RATES[k], rates[k]);
+        for (int end : {0, 1}) {
+            force.getDynamicInstability(i, end, rates[0], rates[1], rates[2], rates[3]);
+            SerializationNode& instability = own.createChildNode("DynamicInstability");
+            for (int k = 0; k < 4; k++)
+                instability.setDoubleProperty(RATES_OF_INSTABILITY[k], rates[k]);
+        }
     }
 }
 
@@ -60,6 +69,12 @@ static unique_ptr<CylinderChainGrowthForce> readGrowthForce(const SerializationN
         force->addGrowingChain(own.getIntProperty("chain"), own.getIntProperty("table"), own.getIntProperty("pool"),
                 own.getIntProperty("firstMonomer"), own.getIntProperty("lastMonomer"),
                 own.getIntProperty("leastMonomers"), rates[0], rates[1], rates[2], rates[3]);
+        int end = 0;
+        for (auto& instability : own.getChildren()) {
+            for (int k = 0; k < 4; k++)
+                rates[k] = instability.getDoubleProperty(RATES_OF_INSTABILITY[k]);
+            force->setDynamicInstability(force->getNumGrowingChains()-1, end++, rates[0], rates[1], rates[2], rates[3]);
+        }
     }
     return force;
 }

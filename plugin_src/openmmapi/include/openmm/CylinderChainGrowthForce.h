@@ -97,16 +97,36 @@ public:
             int& leastMonomers, double& minusOnRate, double& minusOffRate, double& plusOnRate,
             double& plusOffRate) const;
     /**
+     * Let an end of a chain that grows have dynamic instability: in turn it grows, with the rates of addGrowingChain(),
+     * and shrinks.
+     *
+     * @param index             the index of the chain among those that grow
+     * @param end               the minus end (0) or the plus end (1)
+     * @param shrinkingOnRate   the rate at which it gains monomers while it shrinks, measured in nm^3/ps
+     * @param shrinkingOffRate  the rate at which it loses them then, measured in 1/ps
+     * @param catastropheRate   the rate at which it begins to shrink, measured in 1/ps
+     * @param rescueRate        the rate at which it begins to grow again, measured in 1/ps
+     */
+    void setDynamicInstability(int index, int end, double shrinkingOnRate, double shrinkingOffRate,
+            double catastropheRate, double rescueRate);
+    /**
+     * Get the dynamic instability of an end, see setDynamicInstability(): all rates are zero if it has none.
+     */
+    void getDynamicInstability(int index, int end, double& shrinkingOnRate, double& shrinkingOffRate,
+            double& catastropheRate, double& rescueRate) const;
+    /**
      * Get how far chains have grown in a Context.
      *
      * @param context          a Context of a System that holds this Force
      * @param[out] ends        for each chain that grows, the number of its first monomer, and that behind its last one
-     * @param[out] parameters  for each of its ends, minus before plus, how many monomers it has gained, how many it has
-     *                         lost, and how often it had no spare node for one
+     * @param[out] numbers     for each of its ends, minus before plus, one if it shrinks in its dynamic instability,
+     *                         and zero if not
+     * @param[out] parameters  for each of its ends, how many monomers it has gained, how many it has lost, how often it
+     *                         had no spare node for one, how often it has begun to shrink, and how often it was rescued
      * @param[out] loads       for each pool, its concentration, measured in 1/nm^3
      */
-    void getGrowthInContext(Context& context, std::vector<int>& ends, std::vector<double>& parameters,
-            std::vector<double>& loads) const;
+    void getGrowthInContext(Context& context, std::vector<int>& ends, std::vector<int>& numbers,
+            std::vector<double>& parameters, std::vector<double>& loads) const;
     /**
      * Tell a Context how far its chains have grown at its present positions.  Monomers of closed pools come and go as
      * chains have become longer and shorter.

@@ -66,6 +66,13 @@ public:
      * @param context  the context to copy parameters to
      */
     virtual void copyParametersToContext(ContextImpl& context) = 0;
+    /**
+     * Take over chains that have grown or shrunk, where this platform has such.
+     *
+     * @param changed  their numbers among the chains of straight segments
+     */
+    virtual void replaceChains(ContextImpl&, const std::vector<int>&) {
+    }
 };
 
 /**

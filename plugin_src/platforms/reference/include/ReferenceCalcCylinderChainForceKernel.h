@@ -21,6 +21,7 @@ public:
     double execute(ContextImpl& context, bool includeForces, bool includeEnergy);
     void computeEnergies(ContextImpl& context, double& stretching, double& bending);
     void copyParametersToContext(ContextImpl& context);
+    void replaceChains(ContextImpl& context, const std::vector<int>& changed);
     /**
      * Get the engine that computes with the present parameters of the chains.
      */

@@ -60,6 +60,12 @@ void ReferenceCalcCylinderChainForceKernel::computeEnergies(ContextImpl& context
     bending = energy.bending;
 }
 
+void ReferenceCalcCylinderChainForceKernel::replaceChains(ContextImpl&, const vector<int>& changed) {
+    if (!engine->replaceChains(chains->getChains(), changed))
+        engine.reset(new ChainEngine(chains->getChains()));
+    version++;
+}
+
 void ReferenceCalcCylinderChainForceKernel::copyParametersToContext(ContextImpl&) {
     createEngines();
     version++;

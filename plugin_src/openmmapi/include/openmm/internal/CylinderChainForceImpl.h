@@ -42,12 +42,12 @@ public:
         return *description;
     }
     /**
-     * Get the chains, so that those that grow may change; call haveGrown() then.
+     * Get the chains, so that those that grow may change; call haveGrown() with their numbers then.
      */
     cylchain::ChainList& getGrowingList() {
         return description->getGrowingList();
     }
-    void haveGrown(ContextImpl& context);
+    void haveGrown(ContextImpl& context, const std::vector<int>& numbers);
     /**
      * Get the Kernel that computes their forces.
      */
