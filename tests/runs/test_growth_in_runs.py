@@ -29,6 +29,7 @@ from openmm_cylchain.runs.initial_state import build_system
 from openmm_cylchain.runs.relaxation import relaxed_positions
 from openmm_cylchain.runs.run import begin, create_simulation
 from support.configurations import GROWING
+from support.run_figures import rendered
 
 HEAD = '[solvent]\ntemperature = "298 K"\nviscosity = "1 mPa*s"\n'
 MONOMERS = '[[monomers]]\ntype = "ACTIN_ATP"\nconcentration = "5 uM"\n'
@@ -170,7 +171,9 @@ def test_filaments_that_come_apart_before_the_run_do_not_grow():
 def directory(tmp_path_factory):
     path = tmp_path_factory.mktemp("growing")
     (path / "growing.toml").write_text(GROWING)
-    assert main(["run", str(path / "growing.toml"), "--output", str(path / "out")]) == 0
+    with rendered():
+        assert main(["run", str(path / "growing.toml"), "--output", str(path / "out")]) == 0
+    assert (path / "out" / "summary.png").stat().st_size > 10_000
     return path / "out"
 
 
@@ -231,7 +234,6 @@ def test_summary_has_what_ends_did(directory, capsys):
     assert re.search(r"3 × ACT, 4 segments, plus ends +\d+ +\d+ ", said) and "minus end " not in said
     assert "mean length of filaments that grow (nm)" in said and "They grow: see growth.csv" in said
     assert re.search(r"\d+ monomers more would have come, .* give growth a larger longest", said)
-    assert (directory / "summary.png").stat().st_size > 10_000
     run = analysis.load(directory)
     assert len(run) == 21
 

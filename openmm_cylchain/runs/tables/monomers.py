@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ...engine_choice import choose_engine
 from ...filaments.growth import Growth, MonomerPool, Monomers
-from ...filaments.presets import ACTIN_ATP
+from ...filaments.presets import ACTIN_ATP, TUBULIN
 from ...time_steps.schemes import IMPLICIT_SCHEMES
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Flag, Key, Quantity, Text, WordOrQuantity
@@ -14,7 +14,7 @@ from .couplings import group_of
 from .shapes import volume_within
 from .solvent import EDGES
 
-PRESETS = {"ACTIN_ATP": ACTIN_ATP}
+PRESETS = {"ACTIN_ATP": ACTIN_ATP, "TUBULIN": TUBULIN}
 """Monomers by the names that a configuration uses."""
 
 _RATES = ("plus_on_rate", "plus_off_rate", "minus_on_rate", "minus_off_rate")
