@@ -51,6 +51,7 @@ from .kinetics.linker_table import LinkerTable
 from .kinetics.presets import ALPHA_ACTININ, DYNEIN, FILAMIN, KINESIN_1, MYOSIN_II
 from .mechanics.flow import Flow
 from .mechanics.friction import EndCorrections, SegmentFriction, stokes_friction
+from .output.growth_reporter import GrowthReporter
 from .output.reporters import CrosslinkReporter, FilamentReporter, LinkerReporter, TensionReporter, TetherReporter
 from .output.structure_files import write_lammps_data, write_mmcif, write_psf
 from .systems.filaments import Filaments
@@ -106,6 +107,7 @@ __all__ = [
     "Flow",
     "FilamentGrowth",
     "Growth",
+    "GrowthReporter",
     "InputError",
     "InstabilityError",
     "MICROTUBULE",

@@ -35,7 +35,7 @@ FLOORS = (
 )
 FLOOR = {name: floor for floor, names in enumerate(FLOORS) for name in names}
 # The same of plugin_src, where a file is included by its folder's name.
-CORE_FLOORS = ("mechanics", "lanes", "couplings", "dynamics", "networks", "beams", "kinetics")
+CORE_FLOORS = ("mechanics", "lanes", "couplings", "dynamics", "networks", "beams", "kinetics", "growth")
 # Above these, what knows OpenMM includes by "openmm/..." and by names of files alone.
 API_FLOORS = ("openmmapi", "serialization", "platforms")
 # Written by the build.

@@ -2,6 +2,7 @@
 
 from ..couplings.contact_frames import ContactFrame
 from ..couplings.crosslink_records import CrosslinkFrame
+from ..filaments.spare_nodes import count_nodes
 from ..filaments.topology_nodes import filament_nodes, ring_filaments
 from . import statistics
 from .bending import (
@@ -50,6 +51,7 @@ __all__ = [
     "contact_map",
     "contour_lengths",
     "contraction",
+    "count_nodes",
     "director",
     "end_to_end_vectors",
     "filament_distances",

@@ -21,6 +21,7 @@ from .filament_shapes import (
     node_positions,
     normalized,
     refuse_rings,
+    refuse_spare_nodes,
     segment_lengths,
     selected_indices,
     tangents,
@@ -84,9 +85,11 @@ def tangent_correlation(
     Raises
     ------
     InputError
-        For filaments of different lengths, a maximum_lag beyond the filament, a single sample, or rings.
+        For filaments of different lengths, a maximum_lag beyond the filament, a single sample, rings, or filaments
+        that grow.
     """
     refuse_rings(trajectory, filaments, "free correlation of tangents")
+    refuse_spare_nodes(trajectory, filaments, "correlation of the same segments")
     directions = _stacked(tangents(trajectory, filaments))
     segments = directions.shape[2]
     maximum_lag = segments - 1 if maximum_lag is None else whole_number(maximum_lag, 0, "maximum_lag")
@@ -137,8 +140,8 @@ def persistence_length(
     Raises
     ------
     InputError
-        For filaments of a single segment or of different lengths, for rings, for a single sample, and if the mean
-        cosine is not between 0 and 1. If some of them are planar, and others are not.
+        For filaments of a single segment, of different lengths or that grow, for rings, for a single sample, and if the
+        mean cosine is not between 0 and 1. If some of them are planar, and others are not.
 
     Warns
     -----
@@ -179,6 +182,7 @@ def bending_drift(trajectory: mdtraj.Trajectory, filaments: int | Indices | None
 def _mean_bends(trajectory, filaments):
     # 1 - c = |t2 - t1|^2/2, which keeps the digits of stiff chains, averaged over joints: (frames, filaments).
     refuse_rings(trajectory, filaments, "independent joints")
+    refuse_spare_nodes(trajectory, filaments, "joints that are all alike")
     directions = _stacked(tangents(trajectory, filaments))
     if directions.shape[2] < 2:
         raise InputError("A persistence length needs filaments of at least two segments.")
@@ -224,6 +228,7 @@ def bending_mode_amplitudes(
     """
     filament = whole_number(filament, 0, "filament")
     refuse_rings(trajectory, filament, "bending modes of free ends")
+    refuse_spare_nodes(trajectory, filament, "bending modes of one length")
     directions = normalized(np.diff(filament_curves(trajectory, filament)[0], axis=1))
     highest, segments = segment_lengths(trajectory, filament)[0].shape[1], directions.shape[1]
     numbers = np.atleast_1d(in_units_of(modes, DIMENSIONLESS, "modes"))

@@ -19,6 +19,7 @@ import scipy
 from ..errors import InputError
 from ..filaments.beam_refusals import refuse_beams
 from ..filaments.collection import FilamentCollection
+from ..filaments.growth_refusals import refuse_growth
 from ..mechanics.geometry import cross
 from ..units.quantities import LENGTH, in_units_of, positive, shown
 from ..units.types import BoolArray, BoxVectors, FloatArray, IntArray, Scalar, Vectors
@@ -167,8 +168,8 @@ class _Segments:
 
     def __init__(self, chains):
         wrong = "chains must be int arrays, one for each chain, with the indices of two nodes or more."
+        own = _chains_of(chains) if hasattr(type(chains), "node_indices") else chains
         try:
-            own = _chains_of(chains) if hasattr(type(chains), "node_indices") else chains
             chains = [np.asarray(chain) for chain in own]
         except (TypeError, ValueError):
             raise InputError(wrong) from None
@@ -250,6 +251,7 @@ class _Segments:
 
 def _chains_of(filaments):
     refuse_beams(filaments, "the search for crossings")
+    refuse_growth(filaments, "the search for crossings, which follows nodes by their numbers,")
     pairs = zip(filaments, filaments.node_indices)
     return [np.append(nodes, nodes[0]) if filament.closed else nodes for filament, nodes in pairs]
 

@@ -11,7 +11,14 @@ from ..errors import InputError
 from ..filaments.topology_nodes import require_trajectory
 from ..units.quantities import TIME, numbers_of, positive, true_or_false
 from ..units.types import FloatArray, Indices, IntArray, Scalar
-from .filament_shapes import center_of_segments, filament_curves, node_positions, normalized, refuse_rings
+from .filament_shapes import (
+    center_of_segments,
+    filament_curves,
+    node_positions,
+    normalized,
+    refuse_rings,
+    refuse_spare_nodes,
+)
 
 
 @dataclass(frozen=True)
@@ -68,6 +75,7 @@ def mean_square_displacement(
     """
     require_trajectory(trajectory)
     refuse_rings(trajectory, filaments, "axis")
+    refuse_spare_nodes(trajectory, filaments, "displacements of the same nodes")
     window_average = true_or_false(window_average, "window_average")
     lags = _checked_lags(lags, trajectory.n_frames)
     step = _frame_spacing(trajectory) if time_step is None else positive(time_step, TIME, "time_step")

@@ -4,6 +4,8 @@ A filament is a chain of the topology; its nodes are the atoms of that chain wit
 if a bond joins the last one to the first.
 Of a filament of beam elements, whose control points have the name "CTL", functions take the curve: arc lengths of its
 elements, tangents at its nodes, and points along all of it.
+Of a filament that grows, nodes come and go: its other particles are where the last node is (``count_nodes``). What is
+given for each node, segment or joint is NaN where there is none in a frame, and averages are over those that there are.
 Anything else in the trajectory is left alone. Positions have to be those of whole filaments, not wrapped
 into a periodic box (``periodic`` makes them whole). Results are plain numbers in OpenMM's units (nm, ps).
 
@@ -23,6 +25,7 @@ import numpy as np
 from ..beams.curve import arc_lengths, curve_points
 from ..errors import InputError
 from ..filaments.filament import CONTROL_POINT_NAME
+from ..filaments.spare_nodes import count_nodes, without_spare_nodes
 from ..filaments.topology_nodes import filament_nodes, require_trajectory, ring_filaments
 from ..units.quantities import numbers_of
 from ..units.types import FloatArray, Indices
@@ -31,10 +34,15 @@ _POINTS_OF_ELEMENT = 8
 
 
 def node_positions(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
-    """Positions of the nodes: a list of (frames, nodes, 3) arrays in nm."""
+    """Positions of the nodes: a list of (frames, nodes, 3) arrays in nm, NaN of spare ones of a filament that grows."""
+    return [without_spare_nodes(positions).astype(float) for positions in _particles(trajectory, filaments)]
+
+
+def _particles(trajectory, filaments):
+    # With spare nodes, in the precision of the trajectory.
     require_trajectory(trajectory)
     nodes = filament_nodes(trajectory)
-    return [trajectory.xyz[:, nodes[index]].astype(float) for index in selected_indices(filaments, len(nodes))]
+    return [trajectory.xyz[:, nodes[index]] for index in selected_indices(filaments, len(nodes))]
 
 
 def control_point_positions(
@@ -58,17 +66,22 @@ def control_point_positions(
 def filament_curves(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
     """Points by which filaments are drawn: nodes, or of beam elements eight along the curve of each and the last node.
 
-    Those of a ring end before its first point, to which the last one is joined.
+    Those of a ring end before its first point, to which the last one is joined. Spare nodes of a filament that grows
+    are where its last node is.
 
     Returns
     -------
     list of (frames, points, 3) arrays in nm
     """
+    return _curves(_particles(trajectory, filaments), trajectory, filaments)
+
+
+def _curves(particles, trajectory, filaments):
     rings = ring_filaments(trajectory)
     closed = rings[list(selected_indices(filaments, len(rings)))]
-    chains = zip(node_positions(trajectory, filaments), control_point_positions(trajectory, filaments), closed)
+    chains = zip(particles, control_point_positions(trajectory, filaments), closed)
     return [
-        nodes if own is None else curve_points(nodes, own, _POINTS_OF_ELEMENT, bool(ring))
+        nodes.astype(float) if own is None else curve_points(nodes.astype(float), own, _POINTS_OF_ELEMENT, bool(ring))
         for nodes, own, ring in chains
     ]
 
@@ -93,6 +106,19 @@ def refuse_rings(trajectory: mdtraj.Trajectory, filaments: int | Indices | None,
             raise InputError(f"Filament {index} is a ring, which has no {what}: select the others.")
 
 
+def refuse_spare_nodes(trajectory: mdtraj.Trajectory, filaments: int | Indices | None, what: str) -> None:
+    """Raise InputError if one of the filaments has spare nodes in a frame, and so lacks something that is the same in
+    all frames."""
+    particles = _particles(trajectory, filaments)
+    for index, own in zip(selected_indices(filaments, len(filament_nodes(trajectory))), particles):
+        counts = count_nodes(own)
+        if np.any(counts < own.shape[1]):
+            raise InputError(
+                f"Filament {index} grows: {counts.min()} to {counts.max()} of its {own.shape[1]} particles are nodes. "
+                f"They come and go, and it has no {what}: select the others."
+            )
+
+
 def _segment_vectors(trajectory, filaments):
     rings = ring_filaments(trajectory)
     selected = selected_indices(filaments, len(rings))
@@ -105,7 +131,9 @@ def _segment_vectors(trajectory, filaments):
 def end_to_end_vectors(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
     """Vectors from the first to the last node: (frames, filaments, 3) array in nm. Raises InputError for rings."""
     refuse_rings(trajectory, filaments, "end-to-end vector")
-    return np.stack([p[:, -1] - p[:, 0] for p in node_positions(trajectory, filaments)], axis=1)
+    # Spare nodes are where the last node is.
+    ends = [particles[:, [0, -1]].astype(float) for particles in _particles(trajectory, filaments)]
+    return np.stack([p[:, -1] - p[:, 0] for p in ends], axis=1)
 
 
 def radii_of_gyration(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
@@ -113,40 +141,40 @@ def radii_of_gyration(trajectory: mdtraj.Trajectory, filaments: int | Indices | 
 
     Of beam elements, those of the curve.
     """
-    positions = filament_curves(trajectory, filaments)
-    return np.stack([np.sqrt(np.var(p, axis=1).sum(axis=-1)) for p in positions], axis=1)
+    positions = _curves(node_positions(trajectory, filaments), trajectory, filaments)
+    return np.stack([np.sqrt(np.nanvar(p, axis=1).sum(axis=-1)) for p in positions], axis=1)
 
 
 def centers_of_mass(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
     """Mean of the segments' midpoints, all of one weight: (frames, filaments, 3) array in nm."""
     rings = ring_filaments(trajectory)
     selected = selected_indices(filaments, len(rings))
-    lines = filament_curves(trajectory, filaments)
+    lines = _curves(node_positions(trajectory, filaments), trajectory, filaments)
     return np.stack([center_of_segments(p, rings[index]) for index, p in zip(selected, lines)], axis=1)
 
 
 def center_of_segments(positions: FloatArray, ring: bool) -> FloatArray:
     """Mean (frames, 3) of the midpoints of segments between positions (frames, points, 3)."""
     # Every node of a ring belongs to two segments.
-    return positions.mean(axis=1) if ring else 0.5 * (positions[:, 1:] + positions[:, :-1]).mean(axis=1)
+    return positions.mean(axis=1) if ring else 0.5 * np.nanmean(positions[:, 1:] + positions[:, :-1], axis=1)
 
 
 def segment_lengths(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
     """Lengths of the segments, of beam elements along their arcs: a list of (frames, segments) arrays in nm."""
-    chains = zip(_segment_vectors(trajectory, filaments), *_curves(trajectory, filaments))
+    chains = zip(_segment_vectors(trajectory, filaments), *_nodes_and_control_points(trajectory, filaments))
     return [
         np.linalg.norm(vectors, axis=-1) if own is None else arc_lengths(nodes, own, vectors.shape[1] == nodes.shape[1])
         for vectors, nodes, own in chains
     ]
 
 
-def _curves(trajectory, filaments):
+def _nodes_and_control_points(trajectory, filaments):
     return node_positions(trajectory, filaments), control_point_positions(trajectory, filaments)
 
 
 def contour_lengths(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
     """Sums of the segments' lengths: (frames, filaments) array in nm."""
-    return np.stack([lengths.sum(axis=1) for lengths in segment_lengths(trajectory, filaments)], axis=1)
+    return np.stack([np.nansum(lengths, axis=1) for lengths in segment_lengths(trajectory, filaments)], axis=1)
 
 
 def tangents(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
@@ -155,7 +183,7 @@ def tangents(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = No
     Of beam elements, unit vectors along the curve at the nodes: (frames, segments + 1, 3). Raises InputError for a
     segment of zero length.
     """
-    chains = zip(_segment_vectors(trajectory, filaments), *_curves(trajectory, filaments))
+    chains = zip(_segment_vectors(trajectory, filaments), *_nodes_and_control_points(trajectory, filaments))
     return [normalized(vectors if own is None else own - nodes) for vectors, nodes, own in chains]
 
 

@@ -54,7 +54,9 @@ class _NearSegments:
         lines = run.curves(frame)
         starts = np.concatenate([own if filament.ring else own[:-1] for filament, own in zip(run.filaments, lines)])
         self.vectors = np.concatenate([segment_vectors(own, each.ring) for each, own in zip(run.filaments, lines)])
-        self.owners = np.repeat(np.arange(len(run.filaments)), [own.segments * own.pieces for own in run.filaments])
+        self.owners = np.repeat(
+            np.arange(len(run.filaments)), [len(own) - (not each.ring) for each, own in zip(run.filaments, lines)]
+        )
         # Two segments within the cutoff have middles within that and half of their lengths.
         reach = cutoff + float(np.linalg.norm(self.vectors, axis=1).max())
         pairs = pairs_of_points(starts + 0.5 * self.vectors, reach, run.box)
@@ -154,9 +156,11 @@ def mesh_size(run: Run, volume: Scalar | None = None) -> float:
     Raises
     ------
     InputError
-        Without a periodic box and a volume.
+        Without a periodic box and a volume, and where filaments grow, whose length changes.
     """
     room = volume_of(run, volume)
+    if any(own.monomer_length for own in run.filaments):
+        raise InputError("Filaments grow, and the mesh size changes: take the lengths in Run.growth.")
     length = sum(float(own.type.segment_lengths(own.segments, own.ring).sum()) for own in run.filaments)
     return math.sqrt(3.0 * room / length)
 

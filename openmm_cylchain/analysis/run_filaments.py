@@ -36,6 +36,9 @@ class RunFilament:
         Whether it stays in its plane z = const.
     load : str
         What pulls at it, such as "0.2 pN", where loads differ; else empty.
+    monomer_length : float
+        By which it grows, in nm; zero if it does not. Its particles are then nodes as far as ``Run.growth`` says, and
+        the others are where the last node is.
     """
 
     type: Any
@@ -47,6 +50,7 @@ class RunFilament:
     clamped_tangents: tuple[int, ...] = ()
     planar: bool = False
     load: str = ""
+    monomer_length: float = 0.0
 
     @property
     def label(self) -> str:
@@ -55,7 +59,7 @@ class RunFilament:
 
     @property
     def segments(self) -> int:
-        """Number of segments."""
+        """Number of segments, of a filament that grows the most that it can have."""
         return len(self.nodes) - (0 if self.ring else 1)
 
     @property
@@ -91,5 +95,14 @@ def described_filament(own: DescribedFilament) -> RunFilament:
     """A filament of a run, as its description has it."""
     nodes, control_points = (np.array(particles, dtype=int) for particles in (own.nodes, own.control_points))
     return RunFilament(
-        own.type, nodes, own.diameter, own.ring, own.clamped, control_points, own.clamped_tangents, own.planar, own.load
+        own.type,
+        nodes,
+        own.diameter,
+        own.ring,
+        own.clamped,
+        control_points,
+        own.clamped_tangents,
+        own.planar,
+        own.load,
+        own.monomer_length,
     )

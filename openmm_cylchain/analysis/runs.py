@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +16,7 @@ from ..couplings.contact_frames import ContactFrame, DescribedContactFinder, joi
 from ..couplings.crosslink_records import CROSSLINK_RECORD, CrosslinkFrame, crosslinks_at
 from ..couplings.shapes import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
 from ..errors import InputError, PrecisionWarning
+from ..filaments.grown import GrownChain
 from ..output.dcd_frames import DCDFrames
 from ..output.linker_records import LINKER_RECORD
 from ..output.read_tables import read_reports
@@ -91,6 +93,7 @@ class Run:
             _SHAPES[own.shape](own.point, own.vector, own.length) for own in description.walls
         )
         self.complete = description.frames in (None, frames)
+        self._found_contacts_of: tuple[tuple[int, ...], list[DescribedContactFinder]] = (), []
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -137,6 +140,12 @@ class Run:
         return self._by_frame(self._files.pulling)
 
     @cached_property
+    def growth(self) -> dict[str, FloatArray]:
+        """How far filaments have grown: (frames, filaments that grow) arrays by the headers of ``growth.csv``, empty
+        without such."""
+        return self._by_frame(self._files.growth)
+
+    @cached_property
     def wall_forces(self) -> dict[str, FloatArray]:
         """Forces of walls, means over the steps between frames: (frames, faces of all walls) arrays by the headers of
         ``wall_forces.csv``, empty without walls."""
@@ -177,10 +186,10 @@ class Run:
         chains = [(own.nodes, own.control_points, own.ring) for own in self.filaments if len(own.control_points)]
         return BeamCurves(chains, self._description.particles) if chains else None
 
-    @cached_property
-    def _contact_finders(self):
+    def _make_contact_finders(self, nodes):
         own = self._description
-        filaments = {filament.nodes: (number, 1) for number, filament in enumerate(own.filaments)}
+        present = {filament.nodes: tuple(live.tolist()) for filament, live in zip(own.filaments, nodes)}
+        filaments = {live: (number, 1) for number, live in enumerate(present.values())}
         for contacts in own.contacts:
             for particles, *_ in contacts.chains:
                 # Beads of beam elements come behind the nodes of their filament, and before those of the next one.
@@ -189,7 +198,11 @@ class Run:
                     number = max(before, key=lambda i: own.filaments[i].nodes[0])
                     ends = 0 if own.filaments[number].ring else 1
                     filaments[particles] = number, (len(particles) - ends) // (len(own.filaments[number].nodes) - ends)
-        return [DescribedContactFinder(contacts, filaments, own.particles, self.box) for contacts in own.contacts]
+        there = [
+            replace(one, chains=tuple((present.get(chain[0], chain[0]), *chain[1:]) for chain in one.chains))
+            for one in own.contacts
+        ]
+        return [DescribedContactFinder(contacts, filaments, own.particles, self.box) for contacts in there]
 
     def contacts(self, frame: int) -> ContactFrame:
         """Contacts of a frame, of all ``capsule_contact_force`` or ``[contacts]``: none if there is no such.
@@ -206,8 +219,12 @@ class Run:
         InputError
             If the compiled engine is missing.
         """
-        positions = self.positions(frame)
-        return joined_contacts([finder.find(positions) for finder in self._contact_finders])
+        positions, nodes = self.positions(frame), self._nodes_in(frame)
+        counts = tuple(map(len, nodes))
+        if counts != self._found_contacts_of[0]:
+            # Those of filaments that grow change.
+            self._found_contacts_of = counts, self._make_contact_finders(nodes)
+        return joined_contacts([finder.find(positions) for finder in self._found_contacts_of[1]])
 
     @property
     def spring_names(self) -> list[str]:
@@ -329,9 +346,36 @@ class Run:
         return {int(node): own.type.name for own in self.filaments for node in own.nodes}
 
     def nodes(self, frame: int) -> list[FloatArray]:
-        """Positions (nodes, 3) in nm of the nodes of each filament in a frame."""
+        """Positions (nodes, 3) in nm of the nodes that each filament has in a frame."""
         positions = self.positions(frame)
-        return [positions[own.nodes] for own in self.filaments]
+        return [positions[nodes] for nodes in self._nodes_in(frame)]
+
+    def monomers(self, frame: int) -> dict[int, IntArray]:
+        """The number of the first monomer of filaments that grow, and that behind the last one, in a frame.
+
+        By the numbers of filaments. They are counted from where the minus end was at the start.
+        """
+        if not self.growth:
+            return {}
+        ends = [self.growth[f"{end} end (monomers)"][self._frame(frame)] for end in ("minus", "plus")]
+        numbers = self.growth["filament"][self._frame(frame)]
+        return {int(number): np.array(own, dtype=int) for number, *own in zip(numbers, *ends)}
+
+    def _nodes_in(self, frame):
+        # Particles of the nodes that filaments have in a frame.
+        nodes = [own.nodes for own in self.filaments]
+        for number, chain in self.grown(frame).items():
+            nodes[number] = nodes[number][: chain.nodes]
+        return nodes
+
+    def grown(self, frame: int) -> dict[int, GrownChain]:
+        """What segments filaments that grow have in a frame, by the numbers of filaments."""
+        monomers = self.monomers(frame)
+        positions = self.positions(frame) if monomers else np.zeros((0, 3))
+        chains = ((number, self.filaments[number], ends) for number, ends in monomers.items())
+        return {
+            number: GrownChain(own.type, own.monomer_length, ends, positions[own.nodes]) for number, own, ends in chains
+        }
 
     def curves(self, frame: int, per_element: int = PIECES_OF_ELEMENT) -> list[FloatArray]:
         """Points (points, 3) in nm along each filament in a frame.
@@ -341,8 +385,8 @@ class Run:
         """
         positions, per_element = self.positions(frame), whole_number(per_element, 1, "per_element", 10**6)
         return [
-            own.type.segment_kind.curve(positions[own.nodes], positions[own.control_points], per_element, own.ring)
-            for own in self.filaments
+            own.type.segment_kind.curve(positions[nodes], positions[own.control_points], per_element, own.ring)
+            for own, nodes in zip(self.filaments, self._nodes_in(frame))
         ]
 
     def bends(self, frame: int) -> list[FloatArray]:
@@ -352,8 +396,8 @@ class Run:
         """
         positions = self.positions(frame)
         return [
-            own.type.segment_kind.angles(positions[own.nodes], positions[own.control_points], own.ring)
-            for own in self.filaments
+            own.type.segment_kind.angles(positions[nodes], positions[own.control_points], own.ring)
+            for own, nodes in zip(self.filaments, self._nodes_in(frame))
         ]
 
     def segment_tensions(self, frame: int, average: int = 1) -> list[FloatArray]:
@@ -373,17 +417,27 @@ class Run:
         Returns
         -------
         list of (segments,) arrays
+
+        Raises
+        ------
+        InputError
+            For an average over frames in which filaments that grow have other segments.
         """
         frame, average = self._frame(frame), whole_number(average, 1, "average")
         first = max(0, frame - (average - 1) // 2)
         frames = range(first, min(len(self), first + average))
         self.warn_of_rounding()
+        if len(frames) > 1 and self.growth:
+            raise InputError("Segments of filaments that grow come and go: take tensions of single frames, average=1.")
         totals = [np.zeros(own.segments) for own in self.filaments]
         for each in frames:
-            positions = self.positions(each)
-            for own, total in zip(self.filaments, totals):
+            positions, grown = self.positions(each), self.grown(each)
+            for number, own in enumerate(self.filaments):
                 parts = positions[own.nodes], positions[own.control_points]
-                total += own.type.segment_kind.tensions(chain_of(own, self.temperature), *parts)
+                if number in grown:
+                    totals[number] = grown[number].tensions
+                else:
+                    totals[number] += own.type.segment_kind.tensions(chain_of(own, self.temperature), *parts)
         return [total / len(frames) for total in totals]
 
 

@@ -74,10 +74,16 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
     run.warn_of_rounding()
     chains, free = np.zeros((3, 3)), np.zeros(3)
     positions = run.positions(frame)
-    for own in run.filaments:
-        parts = positions[own.nodes], positions[own.control_points]
-        chains += own.type.segment_kind.virial(chain_of(own, run.temperature), *parts)
-        moving = len(own.nodes) + len(own.control_points) - len(own.clamped) - len(own.clamped_tangents)
+    grown = run.grown(frame) if any(own.monomer_length for own in run.filaments) else {}
+    for number, own in enumerate(run.filaments):
+        nodes = len(own.nodes)
+        if number in grown:
+            chains += grown[number].virial
+            nodes = grown[number].nodes
+        else:
+            parts = positions[own.nodes], positions[own.control_points]
+            chains += own.type.segment_kind.virial(chain_of(own, run.temperature), *parts)
+        moving = nodes + len(own.control_points) - len(own.clamped) - len(own.clamped_tangents)
         free += moving * np.array([1.0, 1.0, 0.0 if own.planar else 1.0])
     linkers = run.linkers[frame]
     linkers = linkers[(linkers["filaments"] >= 0).all(axis=1)]

@@ -13,6 +13,7 @@ from ..engine_choice import available_engines, choose_engine
 from ..errors import ContactWarning, InputError
 from ..filaments.chain_type import ChainType
 from ..filaments.collection import FilamentCollection, require_filaments
+from ..filaments.grown import longest_segment
 from ..units.quantities import (
     LARGEST_INT,
     LENGTH,
@@ -200,15 +201,24 @@ def _ends_of_capsules(filaments):
 
 
 def _capsule_lengths(filament, ends):
+    # At rest; of a filament that grows, as it is at the start.
+    if filament.type.segment_kind.straight:
+        return filament.type.segment_lengths(filament.segments, filament.closed)
     lengths = filament.type.segment_lengths(filament.segments, filament.closed)
     return lengths * (filament.segments / (len(ends) - (not filament.closed)))
+
+
+def _longest_capsule(filament, ends):
+    if filament.growth is not None:
+        return longest_segment(filament)
+    return float(_capsule_lengths(filament, ends).max())
 
 
 def _check_box(system, filaments, diameter):
     a, b, c = default_box(system)
     volume = abs(np.dot(a, np.cross(b, c)))
     narrowest = min(volume / np.linalg.norm(np.cross(*pair)) for pair in ((b, c), (c, a), (a, b)))
-    longest = max(float(_capsule_lengths(*each).max()) for each in zip(filaments, _ends_of_capsules(filaments)))
+    longest = max(_longest_capsule(*each) for each in zip(filaments, _ends_of_capsules(filaments)))
     needed = 2.0 * (longest + diameter)
     if narrowest < needed:
         raise InputError(

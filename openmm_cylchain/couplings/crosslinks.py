@@ -39,6 +39,7 @@ from ..units.quantities import (
 from ..units.types import FloatArray, FloatOrArray, Indices, IntArray, Scalar, Vector
 from .crosslink_computation import lengths_and_vectors, slopes_of, thermal_stiffness_of
 from .crosslink_tables import CrosslinkTable, as_numbers
+from .growing_chains import refuse_links_of_growing
 from .link_places import as_places
 from .link_store import LinkStore
 from .native_links import NativeLinks, is_of_compiled_engine
@@ -182,6 +183,7 @@ class Crosslinks:
             raise InputError(f"force_group must be between 0 and 31, but is {force_group}.")
         require_kind(system, openmm.System, "system")
         self._initial.places.check(self._initial.numbers, system.getNumParticles())
+        refuse_links_of_growing(system, self._initial.places, self._initial.numbers)
         periodic = is_periodic(system) if periodic is None else true_or_false(periodic, "periodic")
         if periodic:
             check_rest_lengths(self._initial.numbers, self._initial.rest_length, default_box(system))
@@ -270,6 +272,8 @@ class Crosslinks:
             self._initial = self._initial.with_links(places, *parameters)
         elif len(places):
             _check_in_context(store, context, numbers[:1], np.array([parameters[1]]))
+            assert context is not None
+            refuse_links_of_growing(context.getSystem(), places, numbers)
             store.add(context, places, parameters)
         return numbers
 

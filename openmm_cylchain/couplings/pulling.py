@@ -9,6 +9,7 @@ import openmm
 
 from ..errors import InputError
 from ..filaments.collection import FilamentCollection, require_filaments
+from ..filaments.growth_refusals import growth_refusal
 from ..output.files import TextFile
 from ..output.reporters import FilamentsReporter
 from ..units.quantities import (
@@ -138,7 +139,7 @@ def constant_tension(
     Raises
     ------
     InputError
-        For a filament that does not exist, or a tension or direction that is none.
+        For a filament that does not exist or grows, or a tension or direction that is none.
     """
     require_filaments(filaments)
     every = range(len(filaments))
@@ -146,6 +147,9 @@ def constant_tension(
     for number in numbers:
         if number not in every:
             raise InputError(f"Filament {number} does not exist; there are {len(filaments)}.")
+        if filaments[number].growth is not None:
+            label = f"Filament {number} ({filaments[number].type.name})"
+            raise InputError(growth_refusal(label, "a constant tension"))
     ends = [int(node) for number in numbers for node in filaments.node_indices[number][[0, -1]]]
     return constant_force(ends, tension_forces(len(numbers), tension, direction))
 

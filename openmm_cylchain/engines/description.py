@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..couplings.growing_chains import growing_particles
 from ..couplings.periodicity import is_periodic
 from ..errors import InputError
 from ..mechanics.friction import SegmentFriction
@@ -9,10 +10,17 @@ from ..mechanics.redistribution import ChainSet
 
 
 def advice_after_blow_up(system):
-    """What else to say of a chain that has blown up: in a periodic System it may have been torn by wrapping."""
+    """What else to say of a chain that has blown up: its positions may be those of another length, or may have been
+    torn in a periodic System by wrapping."""
+    advice = ""
+    if growing_particles(system):
+        advice = (
+            " Positions of filaments that grow are those of a length: set them with it, by a checkpoint or by a State "
+            "with integratorParameters=True."
+        )
     if not is_periodic(system):
-        return ""
-    return (
+        return advice
+    return advice + (
         " If positions were wrapped into the periodic box particle by particle, make filaments whole first with "
         "openmm_cylchain.make_whole."
     )

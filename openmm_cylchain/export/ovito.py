@@ -45,16 +45,17 @@ def write_ovito(run: Run, path: str | Path) -> None:
     walls_there = ["wall"] if len(wall_points) else []
     first_particle = len(names) + len(hands) + len(walls_there)
     center, cell = _cell(run)
-    segments = _bonds(run)
-    kinds = np.concatenate([np.full(own.segments * own.pieces, names.index(own.label)) for own in run.filaments])
-    points = [_points(own) for own in run.filaments]
-    types = np.concatenate([np.full(own, names.index(each.label)) for own, each in zip(points, run.filaments)])
-    diameters = np.concatenate([np.full(own, each.diameter) for own, each in zip(points, run.filaments)])
+    known: list[int] = []
     temporary = path.with_name(f".{path.stem}.new.gsd")
     try:
         with gsd.hoomd.open(str(temporary), mode="w") as file:
             for frame in range(len(run)):
-                positions, bonds = [np.concatenate(run.curves(frame))], [segments]
+                curves = run.curves(frame)
+                counts = [len(points) for points in curves]
+                if counts != known:
+                    # Those of filaments that grow change.
+                    known, (segments, kinds, types, diameters) = counts, _along_filaments(run, names, counts)
+                positions, bonds = [np.concatenate(curves)], [segments]
                 particle_types, bond_types, widths = [types], [kinds], [diameters]
                 count = len(types)
                 for kind in range(len(springs)):
@@ -108,18 +109,18 @@ def _joined(lines):
     return np.concatenate([np.zeros((0, 3)), *lines]), np.concatenate([np.zeros((0, 2), dtype=int), *bonds])
 
 
-def _points(own):
-    return own.segments * own.pieces + (not own.ring)
-
-
-def _bonds(run):
-    # Between points that are neighbours on a filament, counted along all of them.
-    bonds, count = [], 0
-    for own in run.filaments:
-        points = count + np.arange(_points(own))
-        bonds.append(np.stack([points, np.roll(points, -1)], axis=1)[: own.segments * own.pieces])
-        count += len(points)
-    return np.concatenate(bonds)
+def _along_filaments(run, names, counts):
+    # Bonds between points that are neighbours on a filament, counted along all of them, with their types; types and
+    # diameters of points.
+    bonds, bond_types, first = [], [], 0
+    for own, count in zip(run.filaments, counts):
+        points = first + np.arange(count)
+        bonds.append(np.stack([points, np.roll(points, -1)], axis=1)[: count - (not own.ring)])
+        bond_types.append(np.full(len(bonds[-1]), names.index(own.label)))
+        first += count
+    types = np.repeat([names.index(own.label) for own in run.filaments], counts)
+    diameters = np.repeat([own.diameter for own in run.filaments], counts)
+    return np.concatenate(bonds), np.concatenate(bond_types), types, diameters
 
 
 def _cell(run):

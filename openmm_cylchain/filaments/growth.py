@@ -13,6 +13,7 @@ from ..units.quantities import (
     AVOGADRO,
     LENGTH,
     NUMBER_DENSITY,
+    ON_RATE,
     RATE,
     VOLUME,
     in_units_of,
@@ -21,16 +22,15 @@ from ..units.quantities import (
     require_kind,
     true_or_false,
 )
-from ..units.types import FloatArray, Scalar
+from ..units.types import FloatArray, Indices, Scalar
+from .chain_type import ChainType
 from .filament_type import FilamentType
-
-ON_RATE = VOLUME * RATE
-"""Unit of the rates of monomers that come, per number of free ones in a volume."""
 
 _PER_AMOUNT = unit.liter / unit.mole / unit.second
 _SAME_LENGTH = 1e-6
 """By what share the length of a segment may differ from that of its monomers."""
 _MOST_MONOMERS_OF_SEGMENT = 100_000
+_MOST_MONOMERS_OF_POOL = 1e15
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +110,7 @@ class MonomerPool:
     Raises
     ------
     InputError
-        For a concentration that is negative, or a volume that is not positive.
+        For a concentration that is negative, a volume that is not positive, or 1e15 monomers or more in it.
     """
 
     concentration: float
@@ -124,6 +124,11 @@ class MonomerPool:
         object.__setattr__(self, "concentration", as_number_density(self.concentration, "concentration of monomers"))
         if self.volume is not None:
             object.__setattr__(self, "volume", positive(self.volume, VOLUME, "volume of a pool of monomers"))
+            if self.concentration * self.volume >= _MOST_MONOMERS_OF_POOL:
+                raise InputError(
+                    f"A pool of {self.concentration * self.volume:.3g} monomers has more than the "
+                    f"{_MOST_MONOMERS_OF_POOL:.0e} that are counted one by one: leave its volume out."
+                )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -306,7 +311,9 @@ def _as_on_rate(rate, name):
     return non_negative(rate, ON_RATE, name)
 
 
-def check_growth(growth: Growth, filament_type: FilamentType, segments: int, closed: bool, clamped, label: str) -> int:
+def check_growth(
+    growth: Growth, filament_type: ChainType, segments: int, closed: bool, clamped: Indices, label: str
+) -> int:
     """The number of spare nodes of a filament that grows; InputError if it cannot."""
     require_kind(growth, Growth, f"{label}: growth")
     if not (isinstance(filament_type, FilamentType) and filament_type.segment_kind.straight) or closed:
@@ -339,7 +346,7 @@ def _shortest_segment(filament_type, growth, fewest):
     length = growth.monomers.length
     for monomers in range(1, fewest + 1):
         try:
-            _segment_type(filament_type, monomers * length)
+            segment_of_length(filament_type, monomers * length)
         except InputError as error:
             if monomers == fewest:
                 raise InputError(
@@ -351,8 +358,11 @@ def _shortest_segment(filament_type, growth, fewest):
     raise AssertionError("The loop returns or raises.")
 
 
-def _segment_type(filament_type, length):
-    # Of the same material: one that has the stiffness of a segment gets that of its material.
+def segment_of_length(filament_type: FilamentType, length: float) -> FilamentType:
+    """The type of a segment of another length in nm, of the same material; InputError if it has no friction.
+
+    Of a type that has the stiffness of a segment, that of its material.
+    """
     modulus = filament_type.segment_stiffness * filament_type.segment_length
     material = replace(filament_type, stretching_stiffness=None, stretching_modulus=modulus)
     return material.with_segment_length(length)
@@ -371,7 +381,7 @@ def segments_by_monomers(
     rows = []
     for monomers in range(1, 2 * per_segment + 1):
         length = monomers * growth.monomers.length
-        own = _segment_type(filament_type, max(monomers, least) * growth.monomers.length)
+        own = segment_of_length(filament_type, max(monomers, least) * growth.monomers.length)
         friction = own.segment_friction(viscosity, temperature, 1)
         extension = 0.0 if filament_type.maximum_extension is None else own.maximum_extension
         stiffness = own.segment_stiffness

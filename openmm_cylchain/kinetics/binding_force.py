@@ -123,7 +123,7 @@ def _add_hand(force, hand, filaments, name):
             f"Linkers {name!r}: a hand binds to filaments of the type {' or '.join(hand.binds_to)}, of which there are "
             f"none among {', '.join(types)}: change its binds_to."
         )
-    longest = max(contour_of(filament)[-1] for filament in filaments if hand.binds(filament.type))
+    longest = max(_longest_contour(filament) for filament in filaments if hand.binds(filament.type))
     if hand.site_spacing is not None and hand.site_spacing > longest * (1.0 + 1e-9):
         raise InputError(
             f"Linkers {name!r}: a hand has no sites, {hand.site_spacing:g} nm apart, on filaments of {longest:g} nm: "
@@ -136,6 +136,10 @@ def _add_hand(force, hand, filaments, name):
     force.setHandWalking(number, hand.speed, hand.stall_force or 0.0, hand.walks_backward, hand.at_end == "hold")
     force.setHandSiteSpacing(number, hand.site_spacing or 0.0)
     return number
+
+
+def _longest_contour(filament):
+    return contour_of(filament)[-1] if filament.growth is None else filament.growth.longest
 
 
 def _anchor_points(linkers, positions):
@@ -249,8 +253,8 @@ def places_of(
         own = positions[minus[segment]] + fraction[:, None] * between
         if curves is not None:
             rows = np.flatnonzero(curves.on_curve(minus[segment], plus[segment]))
-            ends = minus[segment[rows]], plus[segment[rows]]
-            own[rows] = curves.places(*ends, fraction[rows], positions, box)
+            joined = minus[segment[rows]], plus[segment[rows]]
+            own[rows] = curves.places(*joined, fraction[rows], positions, box)
         places[on, side] = own
     for row in np.flatnonzero(np.asarray(table.anchors) >= 0):
         particle, point = force.getAnchor(int(table.anchors[row]))

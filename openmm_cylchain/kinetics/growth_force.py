@@ -10,6 +10,8 @@ from openmm import unit
 
 from ..engine_choice import load_plugin
 from ..filaments.filament import Filament
+from ..filaments.filament_type import FilamentType
+from ..filaments.grown import count_nodes_of_monomers, rest_lengths
 from ..filaments.growth import joints_by_monomers, segments_by_monomers
 from ..units.quantities import AVOGADRO, LENGTH, NUMBER_DENSITY
 from ..units.types import BoolArray, FloatArray, IntArray
@@ -40,7 +42,7 @@ def make_growth_force(filaments: Sequence[Filament], viscosity: float, temperatu
     pools: dict[int, int] = {}
     for number, filament in enumerate(filaments):
         growth, kind = filament.growth, filament.type
-        if growth is None:
+        if growth is None or not isinstance(kind, FilamentType):
             continue
         per_segment = growth.monomers_per_segment(kind)
         key = (kind, growth.monomers.length, growth.fewest_monomers(kind), filament.propulsion)
@@ -125,7 +127,7 @@ def growth_of(context: openmm.Context, filaments: Sequence[Filament]) -> Filamen
         np.array(numbers),
         monomers,
         (monomers[:, 1] - monomers[:, 0]) * per_monomer * LENGTH,
-        count_nodes(monomers, per_segment),
+        count_nodes_of_monomers(monomers, per_segment),
         counts[:, :, 0],
         counts[:, :, 1],
         counts[:, :, 2],
@@ -149,23 +151,3 @@ def contours_in(context: openmm.Context, filaments: Sequence[Filament]) -> list[
         rest = rest_lengths(monomers, filament.growth.monomers_per_segment(filament.type), length)
         contours[number] = monomers[0] * length + np.concatenate([[0.0], np.cumsum(rest)])
     return contours
-
-
-def count_nodes(monomers: IntArray, per_segment: IntArray | int) -> IntArray:
-    """How many nodes filaments have with the monomers (..., 2) from a first one to before another.
-
-    Joints are at multiples of the monomers of a segment, with half of these or more beyond the last joint at an end.
-    """
-    least = np.asarray(per_segment) // 2
-    first = -((-(monomers[..., 0] + least)) // per_segment)
-    last = (monomers[..., 1] - least) // per_segment
-    return np.maximum(0, last - first + 1) + 2
-
-
-def rest_lengths(monomers: FloatArray, per_segment: int, monomer_length: float) -> FloatArray:
-    """Rest lengths (segments,) in nm of a filament with the monomers from a first one to before another."""
-    first, last = monomers
-    nodes = int(count_nodes(np.asarray(monomers), per_segment))
-    joint = -((-(first + per_segment // 2)) // per_segment)
-    joints = per_segment * (joint + np.arange(nodes - 2))
-    return monomer_length * np.diff(np.concatenate([[first], joints, [last]]))

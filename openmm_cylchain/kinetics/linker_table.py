@@ -29,7 +29,8 @@ class LinkerTable:
     filaments : (n, 2) int array
         To which filaments the two hands are bound; -1 where they are not.
     arc_lengths : (n, 2) float array
-        Where, as lengths along the filaments with segments at rest, in nm, from their minus ends.
+        Where, as lengths along the filaments with segments at rest, in nm, from their minus ends, or from where these
+        were at the start if filaments grow: negative where monomers have come at a minus end.
     next_number : int
         The number of the next linker.
     """

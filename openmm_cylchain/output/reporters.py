@@ -20,6 +20,8 @@ import openmm
 from ..errors import InputError
 from ..filaments.beam_refusals import refuse_beams
 from ..filaments.collection import FilamentCollection, require_filaments
+from ..filaments.grown import GrownChain
+from ..filaments.growth_refusals import refuse_growth
 from ..mechanics.redistribution import ChainSet
 from ..mechanics.tension import axial_tensions, filament_tensions
 from ..units.quantities import LARGEST_INT, shown, true_or_false, whole_number
@@ -144,6 +146,7 @@ class FilamentReporter(FilamentsReporter):
 
     Columns: ``stretching_energy`` and ``bending_energy`` in kJ/mol, ``end_to_end_distance`` and ``contour_length`` in
     nm. ``reporter["contour_length"]`` is an array (reports, filaments). The ends of a ring are one, at distance 0.
+    Energies of filaments that grow are those of the segments that they have at a report.
 
     Parameters
     ----------
@@ -166,15 +169,27 @@ class FilamentReporter(FilamentsReporter):
     def _table(self, simulation, state):
         positions = state.getPositions(asNumpy=True)._value
         controls, temperature = self._filaments.control_point_indices, self._filaments.temperature
+        monomers = _monomers(self._filaments, simulation.context)
         rows = [
-            _describe(filament, positions[nodes], positions[own], temperature)
-            for filament, nodes, own in zip(self._filaments, self._nodes, controls)
+            _describe(filament, positions[nodes], positions[own], temperature, monomers.get(number))
+            for number, (filament, nodes, own) in enumerate(zip(self._filaments, self._nodes, controls))
         ]
         return range(len(rows)), rows
 
 
-def _describe(filament, nodes, control_points, temperature):
-    energies = filament.energies(nodes, control_points, temperature)
+def _monomers(filaments, context):
+    # The first monomer of filaments that grow and that behind the last one, by the numbers of filaments.
+    if all(filament.growth is None for filament in filaments):
+        return {}
+    growth = filaments.in_context(context).growth()
+    return dict(zip(growth.filaments.tolist(), growth.monomers))
+
+
+def _describe(filament, nodes, control_points, temperature, monomers):
+    if monomers is None:
+        energies = filament.energies(nodes, control_points, temperature)
+    else:
+        energies = GrownChain(filament.type, filament.growth.monomers.length, monomers, nodes).energies
     end_to_end_distance = 0.0 if filament.closed else np.linalg.norm(nodes[-1] - nodes[0])
     lengths = filament.type.segment_kind.lengths(nodes, control_points, filament.closed)
     return *energies, end_to_end_distance, lengths.sum()
@@ -189,8 +204,9 @@ class TensionReporter(FilamentsReporter):
 
     Columns: ``mean_tension``, ``minimum_tension`` and ``maximum_tension`` over the joints of a filament, or with
     ``joints=True`` a line for each joint with ``tension``, all in kJ/(mol nm); 1 pN is 0.602214 of these. Filaments of
-    one segment have no joints and are left out. ``reporter["mean_tension"]`` is an array (reports, filaments with
-    joints), ``reporter["tension"]`` one of (reports, joints of all filaments), and ``reporter.places`` says which.
+    one segment have no joints and are left out; those that grow are NaN then. ``reporter["mean_tension"]`` is an array
+    (reports, filaments with joints), ``reporter["tension"]`` one of (reports, joints of all filaments), and
+    ``reporter.places`` says which.
 
     Parameters
     ----------
@@ -207,12 +223,13 @@ class TensionReporter(FilamentsReporter):
         Report tensions as means over the last step, with friction and noise
         (``FilamentsInContext.mean_axial_tensions``), which scheme "implicit" of the compiled engine has; the integrator
         records them then. By default, they are instantaneous ones without noise, of the configuration. ``mean_tension``
-        is the mean over joints in both cases.
+        is the mean over joints in both cases. Filaments that grow have these alone, and a line for each filament.
 
     Raises
     ------
     InputError
-        If no filament has joints; with ``mean=True``, during a run, if the integrator has another scheme.
+        If no filament has joints; if filaments grow, without ``mean=True`` or with ``joints=True``; with ``mean=True``,
+        during a run, if the integrator has another scheme.
 
     Examples
     --------
@@ -234,6 +251,8 @@ class TensionReporter(FilamentsReporter):
         refuse_beams(filaments, "a TensionReporter")
         self._joints = joints = true_or_false(joints, "joints")
         self._mean = mean = true_or_false(mean, "mean")
+        if joints or not mean:
+            refuse_growth(filaments, "a TensionReporter of joints or of instantaneous tensions", "Give it mean=True.")
         self._include = () if mean else ("positions", "forces")
         if joints:
             self._thing, self._columns = "filament,joint", ("tension",)
@@ -242,7 +261,7 @@ class TensionReporter(FilamentsReporter):
             ]
         else:
             self._thing, self._columns = "filament", ("mean_tension", "minimum_tension", "maximum_tension")
-            self.places = [(number,) for number, filament in enumerate(filaments) if _joints(filament)]
+            self.places = [(number,) for number, own in enumerate(filaments) if _joints(own) or own.growth is not None]
         if not self.places:
             raise InputError("There are no tensions to report: filaments of one segment have no joints.")
         self._chains: ChainSet | None = None
@@ -258,12 +277,13 @@ class TensionReporter(FilamentsReporter):
         labels = [",".join(map(str, place)) for place in self.places]
         if self._joints:
             return labels, [(tension,) for tension in np.concatenate(tensions)]
+        # A filament that grows may have no joints for a while.
+        tensions = [tension if len(tension) else np.array([np.nan]) for tension in tensions]
         return labels, [(tension.mean(), tension.min(), tension.max()) for tension in tensions]
 
     def _means(self, simulation):
-        return [
-            part._value for part in self._filaments.in_context(simulation.context).mean_axial_tensions() if len(part)
-        ]
+        tensions = self._filaments.in_context(simulation.context).mean_axial_tensions()
+        return [tensions[number]._value for number in dict.fromkeys(place[0] for place in self.places)]
 
     def _present(self, simulation, state):
         if self._chains is None:

@@ -38,6 +38,8 @@ class DescribedFilament:
         Whether it stays in its plane z = const.
     load : str
         What pulls at it, such as "0.2 pN", where loads differ; else empty.
+    monomer_length : float
+        By which it grows, in nm; zero if it does not.
     """
 
     type: ChainType
@@ -48,6 +50,7 @@ class DescribedFilament:
     clamped_tangents: tuple[int, ...] = ()
     planar: bool = False
     load: str = ""
+    monomer_length: float = 0.0
 
     @property
     def diameter(self) -> float:
@@ -162,6 +165,7 @@ class RunDescription:
                     "clamped": own.clamped,
                     "planar": own.planar,
                     **({"load": own.load} if own.load else {}),
+                    **({"monomer_length": own.monomer_length} if own.monomer_length else {}),
                     **(
                         {"control_points": own.control_points, "clamped_tangents": own.clamped_tangents}
                         if own.control_points
@@ -203,6 +207,7 @@ def read_run_description(path: Path) -> RunDescription:
                 tuple(own.get("clamped_tangents", ())),
                 own.get("planar", False),
                 own.get("load", ""),
+                own.get("monomer_length", 0.0),
             )
             for own in content["filaments"]
         )

@@ -20,6 +20,7 @@ class RunFiles:
         self.linker_places = self.path / "linkers.npy"
         self.pulling = self.path / "pulling.csv"
         self.crosslinks = self.path / "crosslinks.npy"
+        self.growth = self.path / "growth.csv"
         self.wall_forces = self.path / "wall_forces.csv"
         self.contact_forces = self.path / "contact_forces.csv"
         self.checkpoint = self.path / "checkpoint.chk"

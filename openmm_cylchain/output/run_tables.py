@@ -145,6 +145,26 @@ PULLING_TABLE_COLUMNS = (
 """A line per report and moving tether; the extension is that of the end-to-end vector that points to the tether."""
 
 
+GROWTH_TABLE_COLUMNS = (
+    "step",
+    "time (ms)",
+    "filament",
+    "length (nm)",
+    "nodes",
+    "minus end (monomers)",
+    "plus end (monomers)",
+    "gained at the minus end",
+    "lost at the minus end",
+    "waited at the minus end",
+    "gained at the plus end",
+    "lost at the plus end",
+    "waited at the plus end",
+    "free monomers (uM)",
+)
+"""A line per report and filament that grows; ends are where they are since the start, in monomers along the filament,
+and have waited so often because there was no spare node."""
+
+
 _MEAN_FORCE_COLUMNS = (
     "mean over (ms)",
     "load (pN)",
@@ -164,13 +184,14 @@ TABLE_COLUMNS = {
     "energies.csv": ENERGY_COLUMNS,
     "linkers.csv": LINKER_TABLE_COLUMNS,
     "pulling.csv": PULLING_TABLE_COLUMNS,
+    "growth.csv": GROWTH_TABLE_COLUMNS,
     "wall_forces.csv": WALL_FORCE_COLUMNS,
     "contact_forces.csv": CONTACT_FORCE_COLUMNS,
 }
 """Columns by the names of files."""
 
-_SIZES = {"ms": MILLISECOND, "nm": 1.0, "pN": PICONEWTON, "pN nm": PICONEWTON, "kT": 1.0}
-# In OpenMM's units; but energies in kT come as such.
+_SIZES = {"ms": MILLISECOND, "nm": 1.0, "pN": PICONEWTON, "pN nm": PICONEWTON, "kT": 1.0, "uM": 1e-6}
+# In OpenMM's units; but energies in kT and concentrations in mol/l come as such.
 
 
 def check_columns(path: Path, header: str) -> None:
@@ -205,7 +226,7 @@ class ReportTable:
     def write(self, step: int, values: Sequence[float]) -> None:
         """Append a line: the step and a number in OpenMM's units for each further column (NaN where it has no meaning).
 
-        Energies in kT come as such.
+        Energies in kT and concentrations in mol/l come as such.
         """
         cells = (
             str(value) if isinstance(value, int) else repr(float(value) / size)

@@ -112,7 +112,7 @@ class Scene:
         values = None if self.scale is None else _values(self.run, self.look, self._director, frame)
         colors = filament_colors(self.run)
         for number, (own, points) in enumerate(zip(self.run.filaments, self.run.curves(frame))):
-            ends = np.stack([points, np.roll(points, -1, axis=0)], axis=1)[: own.segments * own.pieces]
+            ends = np.stack([points, np.roll(points, -1, axis=0)], axis=1)[: len(points) - (not own.ring)]
             color = np.tile(_rgb(colors[own.label]), (len(ends), 1))
             if self.scale is not None and values is not None:
                 color = self.scale.colors(values[number])
@@ -152,8 +152,9 @@ class Scene:
 
 
 def has_polarity(run: Run) -> bool:
-    """Whether the last nodes of filaments are marked: where motors walk to them."""
-    return any(own.motor for own in run.linker_types) and not all(own.ring for own in run.filaments)
+    """Whether the last nodes of filaments are marked: where motors walk to them, or filaments grow."""
+    polar = any(own.motor for own in run.linker_types) or any(own.monomer_length for own in run.filaments)
+    return polar and not all(own.ring for own in run.filaments)
 
 
 def cut_at_faces(ends: FloatArray, box: FloatArray) -> tuple[FloatArray, IntArray]:

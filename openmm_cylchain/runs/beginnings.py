@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ..errors import InputError
 
-START_NAMES = ("network", "bundle", "gliding", "dna", "force-extension")
+START_NAMES = ("network", "bundle", "gliding", "treadmilling", "dna", "force-extension")
 
 
 def start_text(kind):

@@ -35,12 +35,28 @@ from .tables.filament import FILAMENT, MOST_NODES, read_filaments
 from .tables.filament_types import PRESETS as PRESETS
 from .tables.joints import JOINT, read_joint
 from .tables.linkers import HAND, LINKERS, binds_to, read_linkers
+from .tables.monomers import GROWTH, MONOMERS, check_names, check_with_others, read_monomers
 from .tables.particles import PARTICLES, read_particles
 from .tables.simulation import SIMULATION, SimulationSettings, read_seed, read_simulation
 from .tables.solvent import BOX, FLOW, SOLVENT, Solvent, read_flow, read_solvent
 from .toml_lines import lines_of, read_toml
 
-TABLES = (SOLVENT, BOX, FLOW, FILAMENT, PARTICLES, LINKERS, LINK, JOINT, TETHER, PULL, CONTACTS, WALL, SIMULATION)
+TABLES = (
+    SOLVENT,
+    BOX,
+    FLOW,
+    FILAMENT,
+    MONOMERS,
+    PARTICLES,
+    LINKERS,
+    LINK,
+    JOINT,
+    TETHER,
+    PULL,
+    CONTACTS,
+    WALL,
+    SIMULATION,
+)
 """All kinds of tables, in the order of the reference."""
 
 # Where a key that a table lacks may belong to, in this order.
@@ -48,6 +64,8 @@ _OWNERS = (
     SOLVENT,
     SIMULATION,
     FILAMENT,
+    GROWTH,
+    MONOMERS,
     LINKERS,
     HAND,
     BOX,
@@ -86,6 +104,7 @@ class Configuration:
     pulls: tuple = ()
     links: tuple = ()
     joints: tuple = ()
+    monomers: tuple = dataclasses.field(default=(), compare=False)
     tables: dict = dataclasses.field(default_factory=dict, compare=False, repr=False)
     start_files: dict = dataclasses.field(default_factory=dict, compare=False)
     lines: dict = dataclasses.field(default_factory=dict, compare=False, repr=False)
@@ -156,8 +175,10 @@ def _configuration(raw, text, folder, lines):
     (solvent,) = map(read_solvent, tables["solvent"])
     box = tables["box"][0]["edges"] if tables["box"] else None
     (settings,) = tables["simulation"]
-    groups = _filaments(tables, solvent, box, folder)
     walls = tuple(map(read_wall, tables["wall"]))
+    monomers = tuple(read_monomers(own, box, walls) for own in tables["monomers"])
+    check_names(tables["monomers"], monomers)
+    groups = _filaments(tables, solvent, box, folder, monomers)
     linkers = tuple(read_linkers(own, groups, box, read_seed(settings), walls) for own in tables["linkers"])
     configuration = Configuration(
         title,
@@ -175,11 +196,13 @@ def _configuration(raw, text, folder, lines):
         tuple(read_pull(own, groups) for own in tables["pull"]),
         tuple(read_link(own, groups) for own in tables["link"]),
         tuple(read_joint(own, groups) for own in tables["joint"]),
+        monomers,
         tables,
         dict(_start_files(tables["filament"], folder)),
         lines,
     )
     _check_engine(settings, configuration)
+    check_with_others(tables, configuration, settings)
     configuration = dataclasses.replace(configuration, filaments=_disturbed(configuration))
     with settings.naming():
         simulation = read_simulation(
@@ -220,11 +243,11 @@ def _read_tables(raw):
     return tables
 
 
-def _filaments(tables, solvent, box, folder):
+def _filaments(tables, solvent, box, folder, monomers):
     groups, nodes = [], 0
     for number, entries in enumerate(tables["filament"], start=1):
-        groups += read_filaments(entries, number, solvent, box, folder)
-        nodes = sum(group.count * group.nodes for group in groups)
+        groups += read_filaments(entries, number, solvent, box, folder, monomers)
+        nodes = sum(group.count * (group.nodes + group.spare_nodes) for group in groups)
         if nodes > MOST_NODES:
             raise entries.error(f"makes {nodes:.3g} nodes: there can be {MOST_NODES:.0e} in all.")
     return tuple(groups)
@@ -277,6 +300,7 @@ def _disturbed(configuration):
             or any(tethered.get(number, 0) + bool(group.clamped) > 1 for number in numbers),
             "flow": configuration.flow is not None and not configuration.flow.is_at_rest,
             "propulsion": group.propulsion != 0.0,
+            "growth": group.growth is not None,
         }
         disturbed = tuple(name for name, there in reasons.items() if there)
         tension = _tension_of(numbers, configuration.pulls) if disturbed == ("forces",) else None

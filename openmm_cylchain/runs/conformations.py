@@ -83,6 +83,8 @@ class Conformations:
         kind = group.type.segment_kind.name + "s" * (counts != [1])
         text = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
         label = f"{sum(one.count for one in own)} × {group.type.name}, {text} {kind}"
+        if group.growth is not None:
+            label += " at first"
         differ = len({one.load for one, *_ in self._groups}) > 1
         return f"{label}, {group.load}" if differ and group.load else label
 

@@ -2,10 +2,11 @@
 
 import tempfile
 
-from ..output.run_tables import ENERGY_COLUMNS, LINKER_TABLE_COLUMNS
+from ..output.run_tables import ENERGY_COLUMNS, GROWTH_TABLE_COLUMNS, LINKER_TABLE_COLUMNS
 from ..units.text import format_time
 from .configuration import linker_labels, named_bound
 from .errors_of_tables import located_instability
+from .growth_summary import ENDS, MICROMOLAR, free_rate
 from .initial_state import recommended_step
 from .run import Recorder, begin, create_simulation, steps
 from .run_directory import RunDirectory
@@ -40,7 +41,10 @@ def _what_is_built(configuration, built):
     segments = sum(filament.segments for filament in filaments)
     counts = ((len(filaments), "filament"), (segments, "segment"), (system.getNumParticles(), "particle"))
     yield f"  {', '.join(_counted(*one) for one in counts)}"
-    yield from (f"    {label}" for label in group_labels(configuration))
+    for label, group in zip(group_labels(configuration), configuration.filaments):
+        yield f"    {label}"
+        if group.growth is not None:
+            yield f"      {_growth_of(group)}"
     yield from (f"    {own.count} × {own.name}, {own.diameter:g} nm" for own in configuration.particles)
     for label, own in zip(linker_labels(configuration), configuration.linkers):
         count = len(own.anchors) if own.anchors is not None else own.count
@@ -52,6 +56,18 @@ def _what_is_built(configuration, built):
     if configuration.box is not None:
         yield f"  box of {' × '.join(f'{edge:g}' for edge in configuration.box)} nm"
     yield f"  forces: {', '.join(force.getName() for force in system.getForces())}"
+
+
+def _growth_of(group):
+    growth = group.growth
+    concentration = growth.pool.concentration / MICROMOLAR
+    gains = [
+        f"{free_rate(growth, end, concentration):+.3g} monomers/s at the {end} end"
+        for end in ENDS
+        if any(growth.rates(end))
+    ]
+    nodes = f"{_counted(group.spare_nodes, 'spare node')} each, for a length of {growth.longest:g} nm"
+    return f"{' and '.join(gains)}, where it is free, at {concentration:.4g} uM; {nodes}"
 
 
 def _counted(count, what):
@@ -74,6 +90,8 @@ def _cost(configuration, simulation, filaments):
     trajectory = 276 + reports * (3 * (4 * particles + 8) + (56 if configuration.box is not None else 0))
     tables = reports * _BYTES_OF_NUMBER * len(ENERGY_COLUMNS)
     tables += reports * _BYTES_OF_NUMBER * len(LINKER_TABLE_COLUMNS) * len(configuration.linkers)
+    grow = sum(filament.growth is not None for filament in filaments)
+    tables += reports * _BYTES_OF_NUMBER // 2 * len(GROWTH_TABLE_COLUMNS) * grow
     return [
         f"  about {_duration(seconds)} for steps and reports: {1e3 * step:.3g} ms a step at first",
         f"  {reports} frames, every {format_time(settings.steps_per_report * settings.time_step)}: trajectory of "

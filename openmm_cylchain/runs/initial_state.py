@@ -3,7 +3,7 @@
 It calls what users call from Python: methods of ``Filaments`` and ``Crosslinks``, ``capsule_contact_force`` and others.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import openmm
@@ -17,6 +17,7 @@ from ..couplings.pulling import constant_force, constant_tension
 from ..couplings.walls import filament_wall_force, wall_force
 from ..errors import InputError
 from ..filaments import shapes
+from ..filaments.growth import Monomers
 from ..filaments.segment_place import SegmentPlace
 from ..output.progress import LateMessages, ProgressMessages
 from ..systems.filaments import Filaments
@@ -50,7 +51,7 @@ class BuiltSystem:
 
 
 @located_errors
-def build_system(configuration, engine, seed, linkers=True):
+def build_system(configuration, engine, seed, kinetics=True):
     """The System of a configuration.
 
     Parameters
@@ -58,14 +59,14 @@ def build_system(configuration, engine, seed, linkers=True):
     engine : {"compiled", "portable"} or None
     seed : int
         Of random places and shapes.
-    linkers : bool
-        Whether to have those.
+    kinetics : bool
+        Whether to have linkers, and monomers that come and go.
 
     Returns
     -------
     BuiltSystem
     """
-    filaments = place_filaments(configuration, engine, seed, linkers)
+    filaments = place_filaments(configuration, engine, seed, kinetics)
     topology, system, positions = filaments.build(box_vectors(configuration.box))
     positions, spheres, radii, friction = _add_particles(configuration, seed, topology, system, positions)
     count = add_links(configuration, filaments, system, seed)
@@ -105,6 +106,7 @@ def stands_alone(configuration):
         or configuration.tethers
         or configuration.particles
         or configuration.flow
+        or any(own.growth is not None for own in configuration.filaments)
     )
 
 
@@ -127,7 +129,7 @@ def recommended_step(configuration, scheme, engine, seed, built=None):
     return built.filaments.recommended_time_step(scheme, system=built.system, **built.arguments())
 
 
-def place_filaments(configuration, engine, seed, linkers=True):
+def place_filaments(configuration, engine, seed, kinetics=True):
     """Filaments with their initial positions, tethers and linkers.
 
     Filaments without a position are laid out side by side on a grid in the xy plane, centred on the origin, for the eye
@@ -160,7 +162,7 @@ def place_filaments(configuration, engine, seed, linkers=True):
             nodes, control_points = _nodes(*own, planar if group.planar else None)
             if planar is not None and group.planar:
                 planar.add(number, nodes, group.closed)
-            _add(filaments, group, nodes, control_points)
+            _add(filaments, group, nodes, control_points, kinetics)
     messages.finish()
     if configuration.contacts is not None:
         for number, filament in enumerate(filaments):
@@ -172,7 +174,7 @@ def place_filaments(configuration, engine, seed, linkers=True):
             for number in own.filaments:
                 point = filaments[number].positions[own.node] if own.point is None else own.point
                 filaments.add_tether(number, own.node, point, own.stiffness)
-    for own, entries in zip(configuration.linkers if linkers else (), configuration.tables["linkers"]):
+    for own, entries in zip(configuration.linkers if kinetics else (), configuration.tables["linkers"]):
         anchors = None if own.anchors is None else np.array(own.anchors)
         # What is within reach of an anchor is known when overlaps have come apart: see ``relaxation``.
         later = anchors is not None and configuration.relaxes
@@ -194,7 +196,10 @@ def box_vectors(box):
     return None if box is None else np.diag(box)
 
 
-def _add(filaments, group, nodes, control_points):
+def _add(filaments, group, nodes, control_points, kinetics):
+    growth = group.growth
+    if growth is not None and not kinetics:
+        growth = replace(growth, monomers=Monomers(length=growth.monomers.length))
     filaments.add_nodes(
         group.type,
         nodes,
@@ -204,6 +209,7 @@ def _add(filaments, group, nodes, control_points):
         clamped_tangents=group.clamped_tangents,
         planar=group.planar,
         propulsion=group.propulsion,
+        growth=growth,
     )
 
 

@@ -12,8 +12,10 @@ from ..analysis.statistics import mean_with_error
 from ..errors import InputError, PrecisionWarning
 from ..mechanics.geometry import segment_vectors
 from ..output.colors import PLUS_END
+from ..output.run_files import RunFiles
 from ..output.run_tables import MILLISECOND
 from ..units.quantities import thermal_energy
+from .growth_summary import ENDS, GrowthTable
 from .summary import group_members, is_in_equilibrium, mean_over_filaments
 from .tables.linkers import binds_to
 
@@ -31,10 +33,12 @@ GLIDING = {1.0: f"gliding speed, {PLUS_END} ahead", -1.0: "gliding speed, first 
 PULLING = "force of moving tethers along their velocity"
 WALLS = "sum of forces of walls"
 CONTACTS = "sum of forces of contacts on a filament"
+GROWN = "mean length of filaments that grow"
+GROWTH = {end: f"growth of {end} ends" for end in ENDS}
 MEASURES = {
     **dict.fromkeys((ORDER, BUNDLED, JOINED), ""),
-    GYRATION: "nm",
-    **dict.fromkeys(GLIDING.values(), "nm/s"),
+    **dict.fromkeys((GYRATION, GROWN), "nm"),
+    **dict.fromkeys((*GLIDING.values(), *GROWTH.values()), "nm/s"),
     **dict.fromkeys((PULLING, WALLS, CONTACTS), "pN"),
 }
 """Their units by their names."""
@@ -83,6 +87,7 @@ def measure(configuration, run):
         *((name, dict(zip(("first", "last"), values))) for name, values in _of_networks(configuration, run, ends)),
         *_of_gliding(configuration, run),
         *_of_forces(configuration, run),
+        *_of_growth(configuration, run),
     ]
     return [Measure(name, MEASURES[name], **values) for name, values in found]
 
@@ -111,7 +116,7 @@ def _of_networks(configuration, run, frames):
     if free:
         kT = thermal_energy(configuration.solvent.temperature)
         gap = min(kind.rest_length + 2.0 * math.sqrt(kT / kind.stiffness) for kind in free)
-        overlap = _BUNDLE_OVERLAP * min(_length(own) for own in run.filaments)
+        overlap = _BUNDLE_OVERLAP * _shortest(run)
         try:
             yield BUNDLED, [_bundled(run, frame, gap, overlap) for frame in frames]
         except InputError:
@@ -122,8 +127,12 @@ def _of_networks(configuration, run, frames):
         yield GYRATION, [_radius(run, frame) for frame in frames]
 
 
-def _length(filament):
-    return float(filament.type.segment_lengths(filament.segments, filament.ring).sum())
+def _shortest(run):
+    # At rest, and of filaments that grow at the start.
+    lengths = [
+        own.type.segment_lengths(own.segments, own.ring).sum() for own in run.filaments if not own.monomer_length
+    ]
+    return float(min([*lengths, *(run.growth["length (nm)"][0] if run.growth else ())]))
 
 
 def _order(run, frame):
@@ -184,4 +193,22 @@ def _of_forces(configuration, run):
         if len(late) > 1:
             values = late.sum(axis=1) if name == WALLS else late.mean(axis=1)
             mean, error = mean_with_error(values)
+            yield name, {"mean": mean, "standard_error": error}
+
+
+def _of_growth(configuration, run):
+    growing = [group for group in configuration.filaments if group.growth is not None]
+    if not growing:
+        return
+    table = GrowthTable(RunFiles(run.path))
+    lengths, late = table.column("length (nm)"), slice(len(table.times) // 2, None)
+    found = {"first": float(lengths[0].mean()), "last": float(lengths[-1].mean())}
+    if len(lengths[late]) > 1:
+        found["mean"], found["standard_error"] = mean_over_filaments(lengths[late])
+    yield GROWN, found
+    sizes = np.concatenate([np.full(group.count, group.growth.monomers.length) for group in growing])
+    for end, name in GROWTH.items():
+        if len(lengths[late]) > 2 and any(any(group.growth.rates(end)) for group in growing):
+            steps = np.diff(table.times[late])[:, None] / _SECOND
+            mean, error = mean_over_filaments(np.diff(table.ends(end)[late], axis=0) * sizes / steps)
             yield name, {"mean": mean, "standard_error": error}

@@ -63,7 +63,7 @@ def _bind_linkers(configuration, built, positions):
     moved = [
         replace(
             own,
-            positions=positions[nodes[number]],
+            positions=positions[nodes[number][: len(own.positions)]],
             control_points=None if own.control_points is None else positions[controls[number]],
         )
         for number, own in enumerate(filaments)
@@ -75,7 +75,7 @@ def _bind_linkers(configuration, built, positions):
 
 def _come_apart(configuration, positions, progress):
     settings, temperature = configuration.simulation, configuration.solvent.temperature
-    alone = build_system(configuration, settings.engine, settings.seed, linkers=False)
+    alone = build_system(configuration, settings.engine, settings.seed, kinetics=False)
     recommended = alone.filaments.recommended_time_step(settings.scheme, system=alone.system, **alone.arguments())
     longest = min(settings.time_step, recommended.step)
     integrator = alone.filaments.create_integrator(

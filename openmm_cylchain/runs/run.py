@@ -2,8 +2,6 @@
 
 import contextlib
 import math
-import signal
-import threading
 import time
 
 import numpy as np
@@ -21,7 +19,14 @@ from ..mechanics.broken_segment import find_broken_segment
 from ..output.linker_records import LinkerFile, measure_linkers
 from ..output.progress import RunProgress
 from ..output.run_tables import ReportTable, TrajectoryFile
-from ..systems.described_runs import energy_cells, total_energies, write_topology
+from ..systems.described_runs import (
+    energies_of_growing,
+    energy_cells,
+    growth_in,
+    rows_of_growth,
+    total_energies,
+    write_topology,
+)
 from ..systems.refused_context import refusal
 from ..systems.step_check import check_time_step
 from ..time_steps.precision import PRECISIONS
@@ -34,6 +39,7 @@ from .initial_state import build_system
 from .moving_tethers import MovingTethers
 from .relaxation import relaxed_positions
 from .run_directory import Checkpoint, RunDirectory
+from .signals import Signals
 
 _SECONDS_BETWEEN_CHECKS = 0.2
 _MEASURED_REPORTS = 3
@@ -55,9 +61,9 @@ def run(configuration, output, resume=False):
     ``topology.cif``, the same for VMD (``topology.psf``) and OVITO (``topology.data``), ``trajectory.dcd`` (the initial
     configuration and one frame per report interval), ``energies.csv`` and ``checkpoint.chk``; with linkers also
     ``linkers.csv`` (how many are bound, their tensions) and ``linkers.npy`` (where each one is, see
-    ``LinkerReporter``); with walls ``wall_forces.csv``, and with contacts ``contact_forces.csv``: forces of each face,
-    and on each filament, means over the steps since the report before. A resumed run ends with the same files, to the
-    bit, as one that was never interrupted.
+    ``LinkerReporter``); with filaments that grow ``growth.csv``; with walls ``wall_forces.csv``, and with contacts
+    ``contact_forces.csv``: forces of each face, and on each filament, means over the steps since the report before. A
+    resumed run ends with the same files, to the bit, as one that was never interrupted.
 
     Parameters
     ----------
@@ -178,7 +184,7 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
     positions = relaxed_positions(configuration, built, say)
     platform, properties = _platform(settings, built.filaments.engine)
     # An interruption that Python raises within a step may end as an error of OpenMM.
-    with _Signals() as signals, located_instability(configuration), steps():
+    with Signals() as signals, located_instability(configuration), steps():
         check = check_time_step(
             built.filaments,
             built.system,
@@ -277,11 +283,12 @@ class Recorder:
         self._checkpoint = checkpoint
         self._step = 0 if checkpoint is None else checkpoint.step
         self._moving = MovingTethers(configuration, filaments)
+        self._grows = any(filament.growth is not None for filament in filaments)
         self._has_forces = bool(configuration.walls), configuration.contacts is not None
 
     def run_to_end(self):
         settings = self._settings
-        with self.files(), _Signals() as signals:
+        with self.files(), Signals() as signals:
             if self._checkpoint is None:
                 self._report()
             self._progress = RunProgress(settings.steps, self._step, settings.time_step)
@@ -311,6 +318,9 @@ class Recorder:
         if self._moving:
             self._pulling = ReportTable(self._directory.pulling, begun and begun.pulling_size)
             files.append(self._pulling)
+        if self._grows:
+            self._growth = ReportTable(self._directory.growth, begun and begun.growth_size)
+            files.append(self._growth)
         self._forces = ForceTables(self._directory, *self._has_forces, begun and begun.force_sizes)
         files.append(self._forces)
         with contextlib.ExitStack() as stack:
@@ -390,14 +400,15 @@ class Recorder:
         context = self._simulation.context
         state = context.getState(positions=True)
         positions = state.getPositions(asNumpy=True).value_in_unit(unit.nanometer)
-        stretching, bending = total_energies(self._filaments, positions)
+        growth = growth_in(context, self._filaments)
+        stretching, bending = energies_of_growing(context) if growth else total_energies(self._filaments, positions)
         self._check_finite(positions, stretching, bending)
         self._trajectory.write(positions)
         self._energies.write(
             self._step,
             (
                 self._step * self._settings.time_step,
-                *energy_cells(self._filaments, positions, stretching, bending, self._kT),
+                *energy_cells(self._filaments, positions, stretching, bending, self._kT, growth),
             ),
         )
         if self._filaments.linkers:
@@ -408,6 +419,8 @@ class Recorder:
         if any(self._has_forces):
             time, walls, contacts = self._step * self._settings.time_step, wall_forces(context), contact_forces(context)
             self._forces.write(self._step, time, walls, contacts, self._filaments)
+        for row in rows_of_growth(growth):
+            self._growth.write(self._step, (self._step * self._settings.time_step, *row))
         for row in self._moving.rows(self._step, positions):
             self._pulling.write(self._step, row)
 
@@ -427,7 +440,7 @@ class Recorder:
                     segment=min(node, own.segments - 1),
                     step=self._step,
                 )
-        if curved:
+        if curved or self._grows:
             raise InstabilityError(
                 f"The energy is not finite in step {self._step}. Use a smaller time step.", step=self._step
             )
@@ -457,6 +470,7 @@ class Recorder:
                 linker_records=self._places.synchronise() if self._filaments.linkers else 0,
                 pulling_size=self._pulling.synchronise() if self._moving else 0,
                 force_sizes=self._forces.synchronise(),
+                growth_size=self._growth.synchronise() if self._grows else 0,
                 state=self._simulation.context.createCheckpoint(),
             )
         )
@@ -469,26 +483,3 @@ def _growth(work, longer):
     half, whole = np.interp(0.5 * steps[-1], steps, seconds - seconds[0]), seconds[-1] - seconds[0]
     power = np.log2(whole / half) - 1.0 if half > 0.0 else 0.0
     return min(_MOST_GROWTH, max(1.0, longer) ** power) if power > _LEAST_POWER else 1.0
-
-
-class _Signals:
-    # Notes SIGINT and SIGTERM instead of dying at once; a second one of either kills as usual.
-
-    def __init__(self):
-        self.received = None
-        self._previous = {}
-
-    def __enter__(self):
-        if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
-                self._previous[number] = signal.signal(number, self._note)
-        return self
-
-    def _note(self, number, frame):
-        self.received = number
-        for either in self._previous:
-            signal.signal(either, signal.SIG_DFL)
-
-    def __exit__(self, *exception):
-        for number, handler in self._previous.items():
-            signal.signal(number, handler)

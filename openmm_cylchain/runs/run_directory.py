@@ -15,7 +15,7 @@ from ..version import __version__
 from .configuration import changed_keys, read_configuration
 from .start_files import COPIES
 
-_MAGIC = "openmm-cylchain checkpoint 4"
+_MAGIC = "openmm-cylchain checkpoint 5"
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,7 @@ class Checkpoint:
     linker_records: int = 0
     pulling_size: int = 0
     force_sizes: tuple[int, int] = (0, 0)
+    growth_size: int = 0
 
 
 class RunDirectory(RunFiles):
@@ -106,6 +107,7 @@ class RunDirectory(RunFiles):
             self.linker_places,
             self.crosslinks,
             self.pulling,
+            self.growth,
             self.wall_forces,
             self.contact_forces,
         )
@@ -145,6 +147,7 @@ class RunDirectory(RunFiles):
             "linker_records": checkpoint.linker_records,
             "pulling_size": checkpoint.pulling_size,
             "force_sizes": checkpoint.force_sizes,
+            "growth_size": checkpoint.growth_size,
             "state_size": len(checkpoint.state),
         }
         header["digest"] = digest_of_checkpoint(header, checkpoint.state)
@@ -175,6 +178,7 @@ class RunDirectory(RunFiles):
                 linker_records=header["linker_records"],
                 pulling_size=header["pulling_size"],
                 force_sizes=tuple(header["force_sizes"]),
+                growth_size=header["growth_size"],
                 state=state,
             )
         except InputError:

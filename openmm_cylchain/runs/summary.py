@@ -137,6 +137,8 @@ def summarise(configuration, trajectory):
 
 def _summarise_group(configuration, group, members, label, trajectory):
     observables, short = [], []
+    if group.growth is not None:
+        return _growing_group(group, label)
     rounding = _rounding_share(configuration, group, trajectory)
     comparable = is_in_equilibrium(group) and rounding <= _ROUNDING_OF_ALL
     temperature = configuration.solvent.temperature
@@ -163,6 +165,13 @@ def _summarise_group(configuration, group, members, label, trajectory):
         observables=tuple(observables),
         notes=tuple(_notes(configuration, group, members, trajectory, short, rounding)),
     )
+
+
+def _growing_group(group, label):
+    # Their segments are not alike, and they have more or less of them in each frame.
+    note = "They grow: see growth.csv for their lengths, and energies.csv for energies per segment and joint."
+    own = label, group.type.name, group.count, group.segments, group.start
+    return GroupSummary(*own, in_equilibrium=False, observables=(), notes=(note,))
 
 
 def has_exact_extension(group):

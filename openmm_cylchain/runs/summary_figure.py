@@ -24,6 +24,7 @@ from ..units.text import time_unit
 from .configuration import linker_labels
 from .conformations import Conformations
 from .figure_style import FONT_SIZE, legend, legend_below, length_unit
+from .growth_panels import draw_growth
 from .summary import (
     extensions,
     group_labels,
@@ -51,7 +52,10 @@ def write_figure(configuration, directory, trajectory, network):
 
 def _draw(configuration, directory, trajectory, network):
     has_forces = bool(configuration.walls or configuration.contacts)
-    rows = 2 + bool(configuration.linkers) + has_forces
+    grow = [group.growth is not None for group in configuration.filaments]
+    # They have a row of their own, unless there is nothing to compare beside them.
+    own_row = any(grow) and (network is not None or not all(grow))
+    rows = 2 + own_row + bool(configuration.linkers) + has_forces
     figure = Figure(figsize=(12, 4.75 * rows), layout="constrained")
     FigureCanvasAgg(figure)
     figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12, hspace=0.03, wspace=0.03)
@@ -67,19 +71,22 @@ def _draw(configuration, directory, trajectory, network):
             colors_of_filaments(len(configuration.filaments)),
         )
     ]
+    still = [entry for entry, grows in zip(groups, grow) if not grows]
     of_tables = colors_of_filaments(groups[-1][0].table)
     temperature = configuration.solvent.temperature
     energies = read_table(directory.energies)
     labels = linker_labels(configuration)
-    colours = spring_colors([own.kind.is_motor for own in configuration.linkers])
+    colours_of_linkers = spring_colors([own.kind.is_motor for own in configuration.linkers])
     conformations = Conformations(
         configuration,
         [(group, members, of_tables[group.table - 1]) for group, members, *_ in groups],
         trajectory,
         read_records(directory.linker_places) if configuration.linkers else np.zeros(0, LINKER_RECORD),
-        list(zip(labels, colours)),
+        list(zip(labels, colours_of_linkers)),
         (0, -1) if network else (-1,),
-        any(own.kind.is_motor for own in configuration.linkers) or any(group.propulsion for group, *_ in groups),
+        any(own.kind.is_motor for own in configuration.linkers)
+        or any(group.propulsion for group, *_ in groups)
+        or any(grow),
     )
     if network:
         # Theory is that of free filaments: what they do together says more.
@@ -90,17 +97,21 @@ def _draw(configuration, directory, trajectory, network):
     else:
         conformations.draw(axes[0, 0], -1)
         _draw_energies(axes[0, 1], groups, temperature, energies)
-        _draw_tangent_correlation(axes[1, 0], groups, temperature, trajectory)
-        if any(has_exact_extension(group) for group, *_ in groups):
-            _draw_extensions(axes[1, 1], groups, temperature, trajectory)
-        elif any(group.joints for group, *_ in groups):
-            _draw_joint_angles(axes[1, 1], groups, temperature, trajectory)
-        else:
-            _draw_segment_lengths(axes[1, 1], groups, temperature, trajectory)
+        if still:
+            _draw_tangent_correlation(axes[1, 0], still, temperature, trajectory)
+        if any(has_exact_extension(group) for group, *_ in still):
+            _draw_extensions(axes[1, 1], still, temperature, trajectory)
+        elif any(group.joints for group, *_ in still):
+            _draw_joint_angles(axes[1, 1], still, temperature, trajectory)
+        elif still:
+            _draw_segment_lengths(axes[1, 1], still, temperature, trajectory)
+    if any(grow):
+        members, colours = group_members(configuration), [colour for *_, colour in groups]
+        draw_growth(axes[2 if own_row else 1], configuration, members, colours, directory)
     if configuration.linkers:
         table = read_reports(directory.linkers)
-        _draw_numbers_bound(axes[2, 0], labels, colours, table)
-        _draw_tensions(axes[2, 1], labels, colours, table)
+        _draw_numbers_bound(axes[2 + own_row, 0], labels, colours_of_linkers, table)
+        _draw_tensions(axes[2 + own_row, 1], labels, colours_of_linkers, table)
     if has_forces:
         _draw_forces(axes[-1], configuration, directory, trajectory.time)
     for axis in axes.flat:

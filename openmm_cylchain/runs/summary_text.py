@@ -23,7 +23,7 @@ _EXPLANATIONS = {
 }
 
 
-def write_summary(configuration, directory, groups, linkers=(), measures=()):
+def write_summary(configuration, directory, groups, linkers=(), measures=(), growth=()):
     """Write the summary as JSON into the directory of the run."""
     settings = configuration.simulation
     content = {
@@ -38,6 +38,7 @@ def write_summary(configuration, directory, groups, linkers=(), measures=()):
         "groups": [asdict(group) for group in groups],
         **({"linkers": [asdict(own) for own in linkers]} if linkers else {}),
         **({"measures": [asdict(own) for own in measures]} if measures else {}),
+        **({"growth": [asdict(own) for own in growth]} if growth else {}),
     }
     write_atomically(directory.summary, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
 
@@ -48,7 +49,7 @@ def _rounded(value, digits):
     return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e9 else text
 
 
-def format_summary(configuration, groups, linkers=(), measures=()):
+def format_summary(configuration, groups, linkers=(), measures=(), growth=()):
     """The summary as text for a terminal: what is compared with theory, averages of what is not, and measures."""
     settings = configuration.simulation
     lines = [
@@ -63,6 +64,8 @@ def format_summary(configuration, groups, linkers=(), measures=()):
             *_linker_table(linkers),
             "  Means over the last half of the run; the largest tension of all of it.",
         ]
+    if growth:
+        lines += ["", *_growth_table(growth), *_waits(growth)]
     compared = [[own for own in group.observables if own.verdict != NOT_COMPARABLE] for group in groups]
     for group, own in zip(groups, compared):
         if len(own) > 1:
@@ -70,7 +73,7 @@ def format_summary(configuration, groups, linkers=(), measures=()):
     single = [(f"{group.label}: {_name(own[0])}", own[0]) for group, own in zip(groups, compared) if len(own) == 1]
     if single:
         lines += ["", *_table(single)]
-    others = [group for group, own in zip(groups, compared) if len(own) < 2]
+    others = [group for group, own in zip(groups, compared) if len(own) < 2 and group.observables]
     if others:
         lines += ["", *_table_of_averages(others)]
     lines += ["", *_notes(groups)]
@@ -129,6 +132,24 @@ def _linker_table(linkers):
         tensions = ["-" if force is None else f"{force:.3g}" for force in (own.mean_tension, own.largest_tension)]
         rows.append((own.name, *states, *tensions))
     return _aligned(rows, (0,))
+
+
+def _growth_table(growth):
+    rows = [("ends of filaments that grow", "monomers gained", "lost", "gained per second and end", "of free ends")]
+    for own in growth:
+        rate = format_with_error(own.rate, own.rate_error)
+        name = f"{own.name}, {own.end} end{'s' * (not own.name.startswith('1 '))}"
+        rows.append((name, str(own.gained), str(own.lost), rate, _rounded(own.rate_of_free_ends, 3)))
+    return _aligned(rows, (0,))
+
+
+def _waits(growth):
+    waited = sum(own.waited for own in growth)
+    if waited:
+        yield (
+            f"  {waited} monomers more would have come, but there was no spare node for them: give growth a larger "
+            "longest, and run again."
+        )
 
 
 def _name(observable):

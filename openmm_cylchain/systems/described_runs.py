@@ -2,15 +2,18 @@
 
 import dataclasses
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import openmm
+from openmm import unit
 
 from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..couplings.shapes import Shape
 from ..couplings.walls import as_filament_wall_force
+from ..engine_choice import load_plugin
+from ..kinetics.growth_force import FilamentGrowth
 from ..output.files import write_atomically
 from ..output.run_description import (
     DescribedContacts,
@@ -22,6 +25,7 @@ from ..output.run_description import (
 )
 from ..output.run_files import RunFiles
 from ..output.structure_files import write_lammps_data, write_mmcif, write_psf
+from ..units.quantities import LENGTH
 from ..units.types import FloatArray
 from .insertion import filament_masses
 
@@ -76,6 +80,7 @@ def describe_system(
                 tuple(controls.tolist()),
                 tuple(own.clamped_tangents),
                 own.planar,
+                monomer_length=0.0 if own.growth is None else own.growth.monomers.length,
             )
             for own, nodes, controls in zip(filaments, filaments.node_indices, filaments.control_point_indices)
         ),
@@ -177,7 +182,7 @@ def _particle_masses(filaments, system):
     masses = np.array([system.getParticleMass(index)._value for index in range(system.getNumParticles())])
     for filament, *indices in zip(filaments, filaments.node_indices, filaments.control_point_indices):
         for particles, own in zip(indices, filament_masses(filament)):
-            masses[particles] = own
+            masses[particles[: len(own)]] = own
     return masses
 
 
@@ -192,15 +197,40 @@ def total_energies(filaments: Any, positions: FloatArray) -> tuple[float, float]
     return stretching, bending
 
 
+def growth_in(context: openmm.Context, filaments: Any) -> FilamentGrowth | None:
+    """How far filaments have grown in a Context; None if none of them grow."""
+    if all(filament.growth is None for filament in filaments):
+        return None
+    return filaments.in_context(context).growth()
+
+
+def energies_of_growing(context: openmm.Context) -> tuple[float, float]:
+    """Those of ``total_energies`` where some filaments grow, from a Context, which knows their lengths at rest."""
+    kind: Any = load_plugin().CylinderChainForce
+    (force,) = (kind.cast(own) for own in context.getSystem().getForces() if kind.isinstance(own))
+    stretching, bending = force.computeEnergies(context)
+    return stretching._value, bending._value
+
+
 def energy_cells(
-    filaments: Any, positions: FloatArray, stretching: float, bending: float, kT: float
+    filaments: Any,
+    positions: FloatArray,
+    stretching: float,
+    bending: float,
+    kT: float,
+    growth: FilamentGrowth | None = None,
 ) -> tuple[float, ...]:
     """What a line of ENERGY_COLUMNS says behind its step and time.
 
-    Positions are in nm, and energies those of ``total_energies``.
+    Positions are in nm, energies those of ``total_energies``, and ``growth`` that of filaments that grow.
     """
     segments = sum(filament.segments for filament in filaments)
     bends = sum(filament.bends for filament in filaments)
+    if growth is not None:
+        added = sum(
+            int(nodes) - len(filaments[number].positions) for number, nodes in zip(growth.filaments, growth.nodes)
+        )
+        segments, bends = segments + added, bends + added
     ends = np.array([(nodes[0], nodes[-1]) for nodes in filaments.node_indices])
     return (
         stretching,
@@ -210,3 +240,21 @@ def energy_cells(
         bending / bends / kT if bends and kT else np.nan,
         float(np.mean(np.linalg.norm(positions[ends[:, 1]] - positions[ends[:, 0]], axis=1))),
     )
+
+
+def rows_of_growth(growth: FilamentGrowth | None) -> Iterator[tuple[float, ...]]:
+    """What lines of GROWTH_TABLE_COLUMNS say behind step and time, for a FilamentGrowth; none for None."""
+    if growth is None:
+        return
+    lengths = growth.lengths.value_in_unit(LENGTH)
+    concentrations = growth.concentrations.value_in_unit(unit.molar)
+    for index, filament in enumerate(growth.filaments):
+        ends = zip(growth.gained[index], growth.lost[index], growth.waited[index])
+        yield (
+            int(filament),
+            float(lengths[index]),
+            int(growth.nodes[index]),
+            *map(int, growth.monomers[index]),
+            *(int(count) for counts in ends for count in counts),
+            float(concentrations[index]),
+        )

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 import openmm
 from openmm import unit
 
+from ..couplings.growing_chains import refuse_forces_on_growing
 from ..couplings.periodicity import is_periodic
 from ..couplings.stiff_joints import warn_of_stiff_joints
 from ..engine_choice import default_scheme
@@ -17,13 +19,15 @@ from ..engines.protocol import IntegratorSettings
 from ..errors import InputError
 from ..filaments.attachments import add_virtual_site, attachment_positions, neighbors
 from ..filaments.beam_refusals import refuse_beams
+from ..filaments.growth_refusals import refuse_growth
 from ..kinetics.linkers import refuse_linkers_without_volume
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.redistribution import ChainSet
 from ..time_steps.bead_spring_step import refuse_modes
 from ..time_steps.coupled_forces import CoupledForces
+from ..time_steps.growth_step import refuse_countless_monomers
 from ..time_steps.precision import check_precision, refuse_mixed_precision_of_beams
-from ..time_steps.schemes import MODES, check_scheme
+from ..time_steps.schemes import IMPLICIT_SCHEMES, MODES, check_scheme
 from ..time_steps.step_of_system import recommended_step_of
 from ..time_steps.step_warnings import warn_of_long_step
 from ..time_steps.time_step import TimeStep, as_step
@@ -157,7 +161,8 @@ class Filaments(TiedFilaments):
             raise InputError("These filaments are already in a System; make another Filaments for another System.")
         positions = check_target(topology, system, positions)
         check_force_groups(stretching_force_group, bending_force_group)
-        refuse_forces(system, positions, self._filaments, may_coincide=bool(self._attachments))
+        may_coincide = bool(self._attachments) or any(filament.spare_nodes for filament in self._filaments)
+        refuse_forces(system, positions, self._filaments, may_coincide)
         self._nodes, self._control_points = [], []
         self._attachment_indices = np.zeros(len(self._attachments), dtype=int)
         everything = [positions]
@@ -192,6 +197,9 @@ class Filaments(TiedFilaments):
 
     def _coinciding(self):
         for number, nodes in enumerate(self._nodes):
+            if self._filaments[number].spare_nodes:
+                # Any node but the first may become a spare one.
+                yield from combinations(nodes[1:].tolist(), 2)
             mine = self._attachments_of[number]
             yield from neighbors([self._attachments[index] for index in mine], self._attachment_indices[mine], nodes)
 
@@ -327,7 +335,8 @@ class Filaments(TiedFilaments):
         Warns
         -----
         TimeStepWarning
-            If the step exceeds a bound of stability, or the recommended step of a filament, or that of buckling, more
+            If filaments that grow may push walls or others, and an end gains half a monomer or more in a step. If the
+            step exceeds a bound of stability, or the recommended step of a filament, or that of buckling, more
             than four times, or that of hands of linkers; if forces of the System are so stiff that variances may be
             10 % too large (see ``recommended_time_step``); if it is too long for the flow or for self-propelled
             filaments; or if FENE lengths have too much energy at it (``timestep.fene_steps``).
@@ -347,6 +356,8 @@ class Filaments(TiedFilaments):
         InputError
             If the engine does not have the scheme or the precision, all filaments have beam elements and the precision
             is "mixed", contacts or walls are in two stages, the System has constraints or does not hold the filaments.
+            If filaments grow: for an explicit scheme, a force of OpenMM that names their particles, or rates of more
+            than 100000 monomers in a step.
         """
         step_size = as_step(step_size)
         check_precision(precision)
@@ -358,6 +369,10 @@ class Filaments(TiedFilaments):
         if scheme == MODES:
             for number, filament in enumerate(self):
                 refuse_modes(filament, filament_label(number, filament))
+        if scheme not in IMPLICIT_SCHEMES:
+            refuse_growth(self, f"scheme {scheme!r}", "Take an implicit one.")
+        refuse_countless_monomers(self, step_size)
+        refuse_forces_on_growing(system)
         flow = as_flow(flow)
         warn_of_forces_without_images(system)
         refuse_linkers_without_volume(self.linkers, system)
@@ -394,6 +409,7 @@ class Filaments(TiedFilaments):
         """
         self._refuse_if_not_in(system)
         refuse_beams(self, "properties of a ChainSet")
+        refuse_growth(self, "properties of a ChainSet")
         return describe_chains(system, self._placed())
 
     def _bath(self, temperature):

@@ -14,6 +14,7 @@ from ..engines.protocol import Engine, PlacedFilaments
 from ..errors import InputError
 from ..filaments.beam_refusals import refuse_beams
 from ..filaments.filament import Tether
+from ..filaments.growth_refusals import refuse_growth
 from ..kinetics.binding_force import (
     find_binding_force,
     naming_unknown_linkers,
@@ -144,6 +145,7 @@ class FilamentsInContext:
         """
         filaments, nodes = self._placed.filaments, self._placed.node_indices
         refuse_beams(filaments, "instantaneous tensions of joints")
+        refuse_growth(filaments, "instantaneous tensions of joints", "Ask for mean_joint_tensions.")
         state = self._context.getState(positions=True, forces=True)
         positions = state.getPositions(asNumpy=True)._value
         forces = state.getForces(asNumpy=True)._value

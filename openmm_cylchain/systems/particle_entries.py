@@ -46,7 +46,7 @@ def refuse_forces(
         In nm, of what is there.
     filaments : sequence of Filament
     may_coincide : bool
-        Whether particles of filaments may be in one place, as beads at nodes are.
+        Whether particles of filaments may be in one place, as beads at nodes and spare nodes are.
     """
     for index, force in enumerate(system.getForces()):
         for own in _with_those_within(force):
@@ -77,8 +77,8 @@ def _refuse_force(force, label, may_coincide):
     everywhere = kind in _PAIRS_EVERYWHERE or (kind == "CustomGBForce" and _has_pairs_without_exclusions(force))
     if may_coincide and everywhere:
         raise InputError(
-            f"{label} divides by distances of all pairs, but beads and attachment points may be where nodes are. Leave "
-            "them out: capsule_contact_force and crosslinks need none."
+            f"{label} divides by distances of all pairs, but beads, attachment points and spare nodes of filaments "
+            "that grow may be where nodes are. Leave them out: capsule_contact_force and crosslinks need none."
         )
 
 
@@ -125,8 +125,11 @@ def add_noninteracting_entries(
     coinciding : pairs of int
         Particles of filaments that may be in one place.
     """
-    pairs, added = list(coinciding), range(existing, system.getNumParticles())
-    for force in (own for outer in system.getForces() for own in _with_those_within(outer)):
+    added = range(existing, system.getNumParticles())
+    forces = [own for outer in system.getForces() for own in _with_those_within(outer)]
+    # Spare nodes have so many pairs that they are counted out only where a force wants them.
+    pairs = list(coinciding) if any(type(force).__name__ in _EXCLUSIONS for force in forces) else []
+    for force in forces:
         kind = type(force).__name__
         if kind in _ENTRIES:
             _ENTRIES[kind](force, added)

@@ -20,6 +20,7 @@ from openmm import unit
 from ..engines.description import filament_label
 from ..errors import InputError
 from ..filaments.collection import require_filaments
+from ..filaments.grown import longest_segment
 from ..filaments.topology_nodes import filament_nodes, require_trajectory
 from ..units.quantities import LENGTH, in_units_of
 from ..units.types import BoxVectors, Vectors
@@ -70,7 +71,7 @@ def make_whole(positions: Vectors, filaments: Filaments, box_vectors: BoxVectors
     vectors = _lattice(box_vectors, len(frames))
     for number, (filament, nodes) in enumerate(zip(filaments, filaments.node_indices)):
         label = filament_label(number, filament)
-        _refuse_ambiguous(np.full((len(frames), 1), filament.type.segment_length), vectors, f"{label} at rest")
+        _refuse_ambiguous(np.full((len(frames), 1), longest_segment(filament)), vectors, f"{label} at rest")
         frames[:, nodes] = _whole_chains(frames[:, nodes], vectors, label)
         control_points = filaments.control_point_indices[number]
         if len(control_points):

@@ -36,7 +36,15 @@ from ..units.quantities import (
     whole_number,
 )
 from ..units.types import Scalar
-from .described_runs import describe_system, energy_cells, total_energies, write_topology
+from .described_runs import (
+    describe_system,
+    energies_of_growing,
+    energy_cells,
+    growth_in,
+    rows_of_growth,
+    total_energies,
+    write_topology,
+)
 from .filaments import Filaments
 
 if TYPE_CHECKING:
@@ -190,6 +198,8 @@ class RunReporter:
                 if self._append:
                     count = int(np.searchsorted(read_records(files.linker_places)["step"], step, "right"))
                 self._places = opened(LinkerFile(files.linker_places, count))
+            if growth_in(simulation.context, filaments) is not None:
+                self._growth = opened(table(files.growth))
             self._readers = ForceReaders(simulation.context)
             there = bool(self._readers.wall_forces()), bool(self._readers.contact_forces())
             sizes = None
@@ -216,7 +226,9 @@ class RunReporter:
         """Write a frame; OpenMM calls it."""
         step, time = simulation.currentStep, state.getTime()._value
         positions = state.getPositions(asNumpy=True)._value
-        cells = energy_cells(self._filaments, positions, *total_energies(self._filaments, positions), self._kT)
+        growth = growth_in(simulation.context, self._filaments)
+        energies = energies_of_growing(simulation.context) if growth else total_energies(self._filaments, positions)
+        cells = energy_cells(self._filaments, positions, *energies, self._kT, growth)
         # The energies come last: load takes a frame for whole that has a line there.
         self._trajectory.write(positions)
         if self._crosslinks is not None:
@@ -226,6 +238,8 @@ class RunReporter:
             for number, row in enumerate(rows):
                 self._linkers.write(step, (time, number, *row))
             self._places.write(records)
+        for row in rows_of_growth(growth):
+            self._growth.write(step, (time, *row))
         walls, contacts = self._readers.wall_forces(), self._readers.contact_forces()
         self._forces.write(step, time, walls, contacts, self._filaments)
         self._energies.write(step, (time, *cells))

@@ -43,6 +43,7 @@ import openmm
 from ..engine_choice import default_scheme
 from ..errors import InputError, InstabilityError
 from ..filaments.collection import require_filaments
+from ..filaments.growth_refusals import refuse_growth
 from ..filaments.placement import refuse_coinciding
 from ..kinetics.binding_force import find_binding_force
 from ..mechanics.flow import Flow
@@ -152,9 +153,10 @@ def check_time_step(
     Raises
     ------
     InputError
-        At a temperature of zero, or as ``Filaments.create_integrator``.
+        At a temperature of zero, for filaments that grow, or as ``Filaments.create_integrator``.
     """
     require_filaments(filaments)
+    refuse_growth(filaments, "the check of a step, which compares the same nodes in two runs,")
     require_kind(system, openmm.System, "system")
     positions = np.asarray(in_units_of(positions, LENGTH, "positions"))
     if positions.shape != (system.getNumParticles(), 3):

@@ -10,6 +10,7 @@ from ..engines.protocol import PlacedFilaments
 from ..errors import InputError
 from ..filaments.attachments import Attachment, distribute_beads, locate
 from ..filaments.filament import Tether
+from ..filaments.growth_refusals import growth_refusal
 from ..filaments.placement import named_nodes
 from ..filaments.segment_place import SegmentPlace
 from ..kinetics.crosslinker import Crosslinker
@@ -81,11 +82,12 @@ class TiedFilaments(AddedFilaments):
         Raises
         ------
         InputError
-            For a filament or node that does not exist, a second tether, or a stiffness that is not positive.
+            For a filament or node that does not exist, a filament that grows, a second tether, or a stiffness that is
+            not positive.
         """
         label = f"Tether {len(self._tethers)}"
         self._refuse_if_built(label)
-        filament = self._filament_number(filament, label)
+        filament = self._lasting_filament(filament, label, "a tether")
         (node,) = named_nodes([node], len(self[filament].positions), f"{label}:")
         if (filament, node) in self._tethered_nodes:
             raise InputError(f"{label}: node {node} of filament {filament} has a tether already.")
@@ -124,11 +126,11 @@ class TiedFilaments(AddedFilaments):
         Raises
         ------
         InputError
-            For a filament, segment or place that does not exist.
+            For a filament, segment or place that does not exist, or a filament that grows.
         """
         label = f"Attachment point {len(self._attachments)}"
         self._refuse_if_built(label)
-        filament = self._filament_number(filament, label)
+        filament = self._lasting_filament(filament, label, "an attachment point")
         return self._attach(locate(self[filament], filament, label, arc_length, segment, fraction))
 
     def segment_place(
@@ -150,10 +152,11 @@ class TiedFilaments(AddedFilaments):
         Raises
         ------
         InputError
-            For a filament, segment or place that does not exist, or before ``build`` or ``add_to``.
+            For a filament, segment or place that does not exist, a filament that grows, or before ``build`` or
+            ``add_to``.
         """
         label = "Place on a segment"
-        filament = self._filament_number(filament, label)
+        filament = self._lasting_filament(filament, label, "a place on a segment")
         place = locate(self[filament], filament, label, arc_length, segment, fraction)
         nodes = self.node_indices[filament]
         return SegmentPlace(int(nodes[place.segment]), int(nodes[(place.segment + 1) % len(nodes)]), place.fraction)
@@ -180,11 +183,13 @@ class TiedFilaments(AddedFilaments):
         Raises
         ------
         InputError
-            For a filament that does not exist or has beads already, or a spacing that is not positive.
+            For a filament that does not exist, grows or has beads already, or a spacing that is not positive.
         """
         label = f"Beads of filament {shown(filament)}"
         self._refuse_if_built(label)
-        filament = self._filament_number(filament, label)
+        filament = self._lasting_filament(
+            filament, label, "beads", "capsule_contact_force and filament_wall_force need none."
+        )
         if filament in self._beads:
             raise InputError(f"{label}: it has beads already.")
         beads = distribute_beads(self[filament], filament, positive(spacing, LENGTH, f"{label}: spacing"))
@@ -272,6 +277,13 @@ class TiedFilaments(AddedFilaments):
         if filament >= len(self):
             raise InputError(f"{label}: filament {filament} does not exist; there are {len(self)}.")
         return filament
+
+    def _lasting_filament(self, filament, label, what, advice=""):
+        number = self._filament_number(filament, label)
+        own = self[number]
+        if own.growth is not None:
+            raise InputError(f"{label}: {growth_refusal(f'filament {number} ({own.type.name})', what, advice)}")
+        return number
 
     def _placed(self):
         return PlacedFilaments(

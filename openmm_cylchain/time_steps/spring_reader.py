@@ -15,6 +15,7 @@ from ..couplings.pulling import is_constant_force
 from ..couplings.walls import WALL_NAME, as_filament_wall_force
 from ..filaments.collection import FilamentCollection
 from ..kinetics.binding_force import find_binding_force, is_binding_force
+from ..kinetics.growth_force import is_growth_force
 from ..units.types import FloatArray
 from .harmonic_curvatures import bond_curvatures, external_curvatures
 from .springs import ACCURATE, ACCURATE_ALONG_CONTACT, NOWHERE, Springs
@@ -60,7 +61,7 @@ class SpringReader:
             return None if links is None else self._crosslinks(links, label)
         if is_binding_force(force):
             return self._linkers(label)
-        if is_chain_force(force) or isinstance(force, _WITHOUT_STIFFNESS):
+        if is_chain_force(force) or is_growth_force(force) or isinstance(force, _WITHOUT_STIFFNESS):
             return []
         if isinstance(force, openmm.HarmonicBondForce):
             bonds = [force.getBondParameters(index) for index in range(force.getNumBonds())]

@@ -15,6 +15,7 @@ from .buckling_step import steps_of_buckling
 from .coupled_forces import CoupledForces
 from .coupled_step import steps_of_couplings, steps_of_linked_contacts
 from .explicit_forces import ExplicitForces
+from .growth_step import kind_of_segments, steps_of_growth
 from .kinetic_step import steps_of_kinetics
 from .recommended_step import contact_diffusion_step, contact_time_step, recommended_time_step
 from .schemes import IMPLICIT_SCHEMES, check_scheme
@@ -49,6 +50,7 @@ def recommended_step_of(
         steps += _steps_of_diffusion(filaments, system, temperature, confidence, scheme, coupled)
         if scheme in IMPLICIT_SCHEMES:
             steps += steps_of_couplings(filaments, system, temperature, particle_friction, coupled)
+        steps += steps_of_growth(filaments, system)
         steps += steps_of_kinetics(filaments, system, scheme, temperature, particle_friction)
         explicit = ExplicitForces(system, filaments, scheme, particle_friction, coupled)
         steps.append(explicit.recommended_step())
@@ -76,9 +78,7 @@ def _steps_of_types(filaments, scheme, temperature, flow):
             kind.segment_friction(*solvent, segments),
             propulsion,
         )
-        for kind, segments, closed, propulsion in dict.fromkeys(
-            (f.type, f.segments, f.closed, f.propulsion) for f in filaments
-        )
+        for kind, segments, propulsion, closed in dict.fromkeys((*kind_of_segments(f), f.closed) for f in filaments)
     ]
 
 

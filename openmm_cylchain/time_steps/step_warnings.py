@@ -15,6 +15,7 @@ from ..units.types import Numbers, Scalar
 from .buckling_step import steps_of_buckling
 from .coupled_forces import CoupledForces
 from .explicit_forces import ExplicitForces
+from .growth_step import kind_of_segments, warn_if_growth_is_not_resolved
 from .hard_contacts import warn_of_hard_contacts
 from .kinetic_step import steps_of_hands
 from .pulled_filaments import warn_of_pulled_filaments
@@ -44,16 +45,17 @@ def warn_of_long_step(
     """
     warn_if_strained(step, flow)
     solvent = filaments.viscosity, filaments.temperature
-    for f in {(f.type, f.segments, f.propulsion, f.closed): f for f in filaments}.values():
-        warn_if_driven_far(f.type, *solvent, step, f.segments, f.propulsion)
-        if not warn_if_unstable(f.type, *solvent, step, f.segments, scheme):
-            friction = f.type.segment_friction(*solvent, f.segments)
-            warn_if_far_above(f.type, solvent[0], temperature, step, f.segments, scheme, f.closed, friction)
-            warn_if_fene_is_wrong(f.type, temperature, step, friction, scheme)
+    for kind, segments, propulsion, closed in dict.fromkeys((*kind_of_segments(f), f.closed) for f in filaments):
+        warn_if_driven_far(kind, *solvent, step, segments, propulsion)
+        if not warn_if_unstable(kind, *solvent, step, segments, scheme):
+            friction = kind.segment_friction(*solvent, segments)
+            warn_if_far_above(kind, solvent[0], temperature, step, segments, scheme, closed, friction)
+            warn_if_fene_is_wrong(kind, temperature, step, friction, scheme)
     coupled = CoupledForces(system)
     forces = ExplicitForces(system, filaments, scheme, particle_friction, coupled)
     forces.warn_if_too_stiff(step)
     warn_if_hands_are_not_resolved(system, step)
+    warn_if_growth_is_not_resolved(filaments, system, step)
     warn_if_buckling_is_not_resolved(steps_of_buckling(filaments, scheme, forces.constant_forces), step)
     warn_of_pulled_filaments(filaments, temperature, forces.constant_forces)
     warn_of_hard_contacts(filaments, system, step, scheme, particle_friction, coupled)

@@ -26,6 +26,8 @@ TIME = unit.picosecond
 TEMPERATURE = unit.kelvin
 VELOCITY = unit.nanometer / unit.picosecond
 RATE = unit.picosecond**-1
+ON_RATE = VOLUME * RATE
+"""Of what comes, per number of free ones in a volume."""
 ENERGY = unit.kilojoule_per_mole
 FORCE = unit.kilojoule_per_mole / unit.nanometer
 STIFFNESS = unit.kilojoule_per_mole / unit.nanometer**2

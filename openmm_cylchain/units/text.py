@@ -19,6 +19,7 @@ from .quantities import (
     MASS,
     MASS_PER_LENGTH,
     NUMBER_DENSITY,
+    ON_RATE,
     RATE,
     ROTATIONAL_FRICTION,
     STIFFNESS,
@@ -43,6 +44,7 @@ _EXAMPLES = {
     ROTATIONAL_FRICTION: ("rotational friction", "7e4 pN*nm*us"),
     MASS_PER_LENGTH: ("mass per length", "3500 Da/nm"),
     RATE: ("rate", "10 1/s"),
+    ON_RATE: ("rate per concentration", "11.6 1/(uM*s)"),
     VELOCITY: ("velocity", "0.5 um/s"),
     VOLUME: ("volume", "1 um^3"),
     NUMBER_DENSITY: ("concentration", "1 uM"),
@@ -130,7 +132,7 @@ def _convert(number, written, target, name):
         candidates = [quantity]
         if "mol" in symbol or target is NUMBER_DENSITY:
             candidates.append(quantity.to_base_units() * (AVOGADRO / registry.mole))
-        elif "Da" in symbol:
+        elif "Da" in symbol or target is ON_RATE:
             candidates.append(quantity.to_base_units() * (registry.mole / AVOGADRO))
         for candidate in candidates:
             if candidate.is_compatible_with(symbol):

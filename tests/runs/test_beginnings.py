@@ -14,7 +14,7 @@ from openmm_cylchain.runs.initial_state import build_system
 from openmm_cylchain.runs.run import run
 from support.checkpoints import resealed
 from support.commands import finish, start, wait_for_size
-from support.configurations import EVERYTHING
+from support.configurations import EVERYTHING, GROWING
 
 
 @pytest.mark.parametrize("kind", START_NAMES)
@@ -76,9 +76,20 @@ def test_dry_run(tmp_path, capsys):
     assert "--output DIR" in capsys.readouterr().err
 
 
-def test_run_with_everything_is_resumed_to_the_bit(tmp_path):
-    (tmp_path / "all.toml").write_text(EVERYTHING)
-    configuration = parse_configuration(EVERYTHING)
+@pytest.mark.parametrize(
+    ("text", "tables"),
+    [
+        (EVERYTHING, ("energies.csv", "linkers.csv", "linkers.npy", "wall_forces.csv", "contact_forces.csv")),
+        (
+            GROWING,
+            ("energies.csv", "growth.csv", "linkers.csv", "linkers.npy", "wall_forces.csv", "contact_forces.csv"),
+        ),
+    ],
+    ids=["everything", "growing"],
+)
+def test_run_with_everything_is_resumed_to_the_bit(tmp_path, text, tables):
+    (tmp_path / "all.toml").write_text(text)
+    configuration = parse_configuration(text)
     run(configuration, tmp_path / "one")
     output = tmp_path / "two"
     frame = ((tmp_path / "one" / "trajectory.dcd").stat().st_size - 276) // 21
@@ -87,7 +98,6 @@ def test_run_with_everything_is_resumed_to_the_bit(tmp_path):
     process.kill()
     assert finish(process)[0] == -signal.SIGKILL
     run(configuration, output, resume=True)
-    tables = ("energies.csv", "linkers.csv", "linkers.npy", "wall_forces.csv", "contact_forces.csv")
     for name in ("trajectory.dcd", *tables):
         contents = [(tmp_path / folder / name).read_bytes() for folder in ("one", "two")]
         assert contents[0] == contents[1], name

@@ -48,7 +48,7 @@ def linkers(rates, more, name="m", reach=50):
 
 def test_a_run_of_joints_too_stiff_for_a_grid_of_angles_has_its_figure(tmp_path):
     with rendered():
-        groups, _, _ = run_with_summary(parsed(filament=STIFF), tmp_path / "out")
+        groups, *_ = run_with_summary(parsed(filament=STIFF), tmp_path / "out")
     assert groups and (tmp_path / "out" / "summary.png").stat().st_size > 10**4
 
 

@@ -149,6 +149,64 @@ seed = 5
 """Filaments of beam elements, beside one of straight segments: clamped, linked, joined, planar, of given nodes."""
 
 
+GROWING = """
+title = "growing"
+[solvent]
+temperature = "298 K"
+viscosity = "1 mPa*s"
+[[monomers]]
+type = "ACTIN_ATP"
+concentration = "50 uM"
+volume = "box"
+[[monomers]]
+name = "slow"
+length = "3 nm"
+plus_on_rate = "5 1/(uM*s)"
+plus_off_rate = "60 1/s"
+concentration = "2 uM"
+[[filament]]
+type = "F_ACTIN"
+segment_length = "108 nm"
+segments = [4, 5]
+count = 5
+growth = { monomers = "ACTIN_ATP", longest = "700 nm", shortest = "300 nm" }
+inside = { shape = "sphere", radius = "0.5 um" }
+[[filament]]
+type = "F_ACTIN"
+segment_length = "60 nm"
+segments = 6
+growth = { monomers = "slow", longest = "1 um", minus_capped = true }
+clamped = [0]
+planar = true
+position = ["0 nm", "0 nm", "100 nm"]
+[[filament]]
+type = "MICROTUBULE"
+segment_length = "200 nm"
+segments = 3
+position = ["0 nm", "0 nm", "0 nm"]
+[[linkers]]
+type = "MYOSIN_II"
+count = 200
+bound = 50
+[contacts]
+diameter = "10 nm"
+[[wall]]
+shape = "sphere"
+radius = "0.8 um"
+stiffness = "0.1 pN/nm"
+[simulation]
+time_step = "0.1 ms"
+duration = "100 ms"
+report_interval = "5 ms"
+checkpoint_interval = "15 ms"
+seed = 2
+platform = "CPU"
+threads = 1
+checks = false
+"""
+"""Filaments that grow of monomers of two kinds, one of which becomes less, beside one that does not, with linkers."""
+
+
 def placed_filaments(configuration):
     """Filaments with their initial positions, and linkers, that a run of a configuration has."""
     settings = configuration.simulation

@@ -202,7 +202,7 @@ def test_beads_may_be_where_nodes_are(name, reference):
 @pytest.mark.parametrize("name", ["CustomGBForce, OBC2", "AmoebaMultipoleForce", "GBSAOBCForce", "HippoNonbondedForce"])
 def test_forces_without_exclusions_are_refused_beside_beads(name):
     topology, system = system_with(FORCES[name]())
-    with pytest.raises(InputError, match="beads and attachment points may be"):
+    with pytest.raises(InputError, match="beads, attachment points and spare nodes of filaments that grow may be"):
         with_filament(topology, system, beads=4.0)
 
 

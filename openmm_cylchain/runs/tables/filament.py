@@ -5,13 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...errors import InputError
 from ...filaments.chain_type import ChainType
+from ...filaments.growth import Growth, check_growth
 from ...filaments.shapes import MINIMUM_RING
 from ...units import quantities as units
 from ..keys import Choice, Either, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
 from ..start_files import read_start
 from ..table import TableKind
 from .filament_types import MONOMER_LENGTHS, TYPE_KEYS, read_filament_type
+from .monomers import GROWTH, GROWTH_EXAMPLE, read_growth
 from .shapes import REGION, REGION_EXAMPLE, Region
 
 STARTS = ("equilibrium", "straight")
@@ -113,6 +116,12 @@ FILAMENT = TableKind(
             0.0,
             "Force that propels it: on each segment along its tangent, or on each beam element along its curve.",
         ),
+        Key(
+            "growth",
+            Inline(GROWTH, GROWTH_EXAMPLE),
+            None,
+            "Filaments gain and lose monomers of a [[monomers]] table at their ends: see below.",
+        ),
         Key("file", Text('"start.npz"'), None, "Start from a file: see below."),
         Key("topology", Text('"topology.cif"'), None, "Topology of a file that is a trajectory."),
         Key("frame", Whole(-(10**12), 10**12, "-1"), None, "Which frame of a trajectory; the last one if not given."),
@@ -137,6 +146,7 @@ class FilamentGroup:
     ``table`` is the number of the table, from 1; ``disturbed`` what makes them no free chains, in words: links, walls
     and so on; ``tension`` that of their ends in kJ/(mol nm), with its direction, if nothing else is. ``positions`` are
     those of a file, or given ones, for each filament, and ``control_points`` those of beam elements or None.
+    Those that grow have ``spare_nodes`` each.
     """
 
     type: ChainType
@@ -159,6 +169,8 @@ class FilamentGroup:
     positions: tuple | None = dataclasses.field(default=None, compare=False, repr=False)
     control_points: tuple | None = dataclasses.field(default=None, compare=False, repr=False)
     clamped_tangents: tuple = ()
+    growth: Growth | None = dataclasses.field(default=None, compare=False)
+    spare_nodes: int = 0
 
     @property
     def nodes(self):
@@ -181,8 +193,8 @@ class FilamentGroup:
         return "linkers" in self.disturbed
 
 
-def read_filaments(entries, table, solvent, box, folder):
-    """The FilamentGroups of a [[filament]] table, one for each length.
+def read_filaments(entries, table, solvent, box, folder, monomers):
+    """The FilamentGroups of a [[filament]] table, one for each length, for MonomerGroups.
 
     The number of the table is counted from 1; files are named from the folder.
     """
@@ -192,6 +204,7 @@ def read_filaments(entries, table, solvent, box, folder):
         groups = _from_file(entries, kind, box, folder)
     else:
         groups = _from_nodes(entries, kind) if "nodes" in entries else _placed(entries, kind, box)
+    growth = None if entries["growth"] is None else read_growth(entries["growth"], monomers)
     own = {"planar": True} if entries["planar"] else {}
     common = {"propulsion": entries["propulsion"], "height": entries["height"], "table": table}
     finished = []
@@ -201,8 +214,26 @@ def read_filaments(entries, table, solvent, box, folder):
             given = entries["clamped"], entries["clamped_tangents"]
             clamped, tangents = kind.segment_kind.clamps(*given, group.nodes, label)
             kind.segment_friction(solvent.viscosity, solvent.temperature, group.segments)
-        finished.append(dataclasses.replace(group, clamped=clamped, clamped_tangents=tangents, **own, **common))
+        spare = 0 if growth is None else _spare_nodes(entries, growth, group, clamped)
+        held = {"clamped": clamped, "clamped_tangents": tangents}
+        finished.append(dataclasses.replace(group, **held, growth=growth, spare_nodes=spare, **own, **common))
     return finished
+
+
+def _spare_nodes(entries, growth, group, clamped):
+    label = entries.label.rstrip(":")
+    if group.type.segment_kind.straight:
+        try:
+            growth.monomers_per_segment(group.type)
+        except InputError:
+            length = growth.monomers.length
+            near = max(2, round(group.type.segment_length / length)) * length
+            raise entries.error(
+                f"grows by {length:g} nm with a monomer, and its segments are {group.type.segment_length:g} nm long: "
+                f'they must be a whole number of monomers, as with segment_length = "{near:.12g} nm"'
+            ) from None
+    with entries.naming():
+        return check_growth(growth, group.type, group.segments, group.closed, clamped, label)
 
 
 def _check_element(entries, kind):

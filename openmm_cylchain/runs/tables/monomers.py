@@ -1,0 +1,175 @@
+"""[[monomers]], of which filaments grow, and the ``growth`` of a [[filament]] table."""
+
+import dataclasses
+from dataclasses import dataclass
+
+from ...engine_choice import choose_engine
+from ...filaments.growth import Growth, MonomerPool, Monomers
+from ...filaments.presets import ACTIN_ATP, TUBULIN
+from ...time_steps.schemes import IMPLICIT_SCHEMES
+from ...units import quantities as units
+from ..keys import REQUIRED, Choice, Flag, Key, Quantity, Text, WordOrQuantity
+from ..table import TableKind
+from .couplings import group_of
+from .shapes import volume_within
+from .solvent import EDGES
+
+PRESETS = {"ACTIN_ATP": ACTIN_ATP, "TUBULIN": TUBULIN}
+"""Monomers by the names that a configuration uses."""
+
+_RATES = ("plus_on_rate", "plus_off_rate", "minus_on_rate", "minus_off_rate")
+GROWTH_EXAMPLE = '{ longest = "5 um" }'
+
+MONOMERS = TableKind(
+    "monomers",
+    (
+        Key("type", Choice(tuple(PRESETS)), None, "A preset, of which any property can be changed by the keys below."),
+        Key("name", Text('"actin"'), None, "What filaments call them; the type if not given."),
+        Key("length", Quantity(units.LENGTH), None, "By which a filament grows with a monomer."),
+        Key(
+            "plus_on_rate",
+            Quantity(units.ON_RATE, "zero"),
+            None,
+            "k_on of the end at the last node, which gains k_on c monomers per time.",
+        ),
+        Key("plus_off_rate", Quantity(units.RATE, "zero"), None, "k_off of that end: it loses so many."),
+        Key("minus_on_rate", Quantity(units.ON_RATE, "zero"), None, "k_on of the end at the first node."),
+        Key("minus_off_rate", Quantity(units.RATE, "zero"), None, "k_off of that end."),
+        Key(
+            "concentration",
+            Quantity(units.NUMBER_DENSITY, "zero"),
+            REQUIRED,
+            "Of free monomers, c; with a volume, at the start.",
+        ),
+        Key(
+            "volume",
+            WordOrQuantity(("box",), units.VOLUME),
+            None,
+            'In which they are, "box" for what the wall and the box leave. A filament takes monomers out of it, and '
+            "they become fewer. Without it, their concentration stays as it is.",
+        ),
+    ),
+    "Monomers of which filaments grow, and how many are free, see `Monomers` and `MonomerPool`. Filaments that name "
+    "the same table share them.",
+    repeated=True,
+)
+
+GROWTH = TableKind(
+    "growth",
+    (
+        Key("monomers", Text('"actin"'), None, "Name of a [[monomers]] table; of the only one if not given."),
+        Key("longest", Quantity(units.LENGTH), REQUIRED, "Length for which a filament has spare nodes."),
+        Key("shortest", Quantity(units.LENGTH), None, "To which it shrinks at most; half a segment if not given."),
+        Key("plus_capped", Flag(), False, "Whether the end at the last node neither gains nor loses monomers."),
+        Key("minus_capped", Flag(), False, "Whether that at the first node does not."),
+    ),
+    "How filaments grow and shrink at their ends, see `Growth`.",
+)
+
+
+@dataclass(frozen=True)
+class MonomerGroup:
+    """A [[monomers]] table: its name, what they are, and those that are free."""
+
+    name: str
+    monomers: Monomers
+    pool: MonomerPool
+
+
+def read_monomers(entries, box, walls):
+    """The MonomerGroup of a [[monomers]] table."""
+    preset = PRESETS[entries["type"]] if "type" in entries else None
+    name = entries["name"] or entries["type"]
+    if name is None:
+        raise entries.error(
+            f"lacks the key 'type': name a preset ({', '.join(PRESETS)}), or describe the monomers with name, length "
+            f"and {', '.join(_RATES)}."
+        )
+    properties = entries.given("length", *_RATES)
+    if preset is None:
+        entries.require("length")
+    if preset is None and not any(properties.get(rate) for rate in _RATES):
+        raise entries.error('lacks its rates: add lines such as plus_on_rate = "11.6 1/(uM*s)"')
+    volume = entries["volume"]
+    if volume == "box":
+        volume = volume_within([wall.shape for wall in walls], box)
+        if volume is None:
+            raise entries.at("volume").error(
+                "is that which walls and the box leave, but they do not say it: add a periodic [box] with edges = "
+                f'{EDGES.example}, or write a volume, as in "1 um^3".'
+            )
+    with entries.naming():
+        monomers = Monomers(**properties) if preset is None else dataclasses.replace(preset, **properties)
+        return MonomerGroup(name, monomers, MonomerPool(entries["concentration"], volume))
+
+
+def check_names(tables, groups):
+    """Raise ConfigurationError unless MonomerGroups of tables have different names."""
+    names = [own.name for own in groups]
+    for entries, name in zip(tables, names):
+        if names.count(name) > 1:
+            raise entries.error(f"is called {name!r}, and so is another one: give each a name of its own.")
+
+
+def read_growth(entries, monomers):
+    """The Growth of a ``growth`` table, for MonomerGroups."""
+    found = [own for own in monomers if entries["monomers"] in (None, own.name)]
+    if not monomers:
+        raise entries.error(
+            'needs monomers: add a [[monomers]] table with lines such as type = "ACTIN_ATP" and concentration = "1 uM"'
+        )
+    if not found:
+        names = ", ".join(own.name for own in monomers)
+        raise entries.at("monomers").error(f"is {entries['monomers']!r}, but there are {names}.")
+    if len(found) > 1:
+        names = ", ".join(own.name for own in monomers)
+        raise entries.error(f"lacks the key 'monomers': there are {names}.")
+    with entries.naming():
+        return Growth(
+            monomers=found[0].monomers,
+            pool=found[0].pool,
+            **{name: entries[name] for name in ("longest", "shortest", "plus_capped", "minus_capped")},
+        )
+
+
+def check_with_others(tables, configuration, settings):
+    """Raise ConfigurationError where filaments that grow have what they cannot have.
+
+    ``tables`` are the entries of all tables, by names; ``settings`` those of [simulation].
+    """
+    groups = configuration.filaments
+    if all(group.growth is None for group in groups):
+        _refuse_unused(tables["monomers"])
+        return
+    with settings.naming():
+        if choose_engine(settings["engine"]) != "compiled":
+            raise settings.at("engine").error('has no filaments that grow: leave growth out, or write "compiled".')
+    if settings["scheme"] not in (None, *IMPLICIT_SCHEMES):
+        raise settings.at("scheme").error('has no filaments that grow: leave it out, or write "implicit".')
+    for entries, own in zip(tables["linkers"], configuration.linkers):
+        if own.anchors is not None and isinstance(own.anchors[0], int):
+            raise entries.at("anchors").error("must be points where filaments grow, but are numbers of nodes.")
+    for name, what in (("tether", "tethers do not hold"), ("pull", "constant forces do not pull at")):
+        for entries, own in zip(tables[name], getattr(configuration, f"{name}s")):
+            for number in own.filaments:
+                _refuse_growth(entries, number, groups, what)
+    for entries, own in zip(tables["link"], configuration.links):
+        if own.between is None:
+            raise entries.at("within").error("may join filaments that grow, which links do not yet: give between.")
+        for place in own.between:
+            if place["filament"] is not None:
+                _refuse_growth(entries, place["filament"], groups, "links do not join")
+
+
+def _refuse_unused(tables):
+    for entries in tables:
+        raise entries.error(f"but no filaments grow: add to a [[filament]] table the line growth = {GROWTH_EXAMPLE}")
+
+
+def _refuse_growth(entries, number, groups, what):
+    group = group_of(number, groups)
+    if group.growth is not None:
+        raise entries.error(
+            f"means filament {number}, which grows ([[filament]] number {group.table}): {what} filaments that grow "
+            "yet. Leave its growth out, or take another filament."
+        )

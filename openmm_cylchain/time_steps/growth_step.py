@@ -1,0 +1,112 @@
+"""The recommended step of filaments that grow.
+
+Free ends gain and lose monomers at their rates whatever the step is, and lengths and bends keep their equilibrium. The
+segment at an end has half as many monomers as others at least: where a rule depends on what a segment is, that one
+counts. An end that pushes a wall or another filament gains monomers while all else stands still, so that a step should
+see few of them: ``k_on c dt`` is a fifth at most.
+"""
+
+import warnings
+from collections.abc import Iterable
+
+import openmm
+
+from ..couplings.capsule_contacts import as_capsule_contact_force
+from ..couplings.walls import as_filament_wall_force
+from ..errors import InputError, TimeStepWarning
+from ..filaments.chain_type import ChainType
+from ..filaments.collection import FilamentCollection
+from ..filaments.filament import Filament
+from ..filaments.filament_type import FilamentType
+from ..filaments.growth import segment_of_length
+from ..units.text import format_time
+from .time_step import TimeStep
+
+SHARE_OF_ON_RATE = 0.2
+"""The largest product of a step and the rate of monomers that come to an end that pushes."""
+
+_LARGEST_SHARE = 0.5
+"""The same, from which on a step is warned of."""
+
+_MOST_EVENTS = 1e5
+_PER_SECOND = 1e12
+
+
+def kind_of_segments(filament: Filament) -> tuple[ChainType, int, float]:
+    """The type of a filament, its number of segments, and their propulsion.
+
+    If it grows, those of a filament of its length, all of whose segments are as short as one at an end may be.
+    """
+    growth, kind = filament.growth, filament.type
+    if growth is None or not isinstance(kind, FilamentType):
+        return kind, filament.segments, filament.propulsion
+    shortest = (growth.monomers_per_segment(kind) // 2) * growth.monomers.length
+    share = shortest / kind.segment_length
+    return segment_of_length(kind, shortest), max(1, round(filament.segments / share)), filament.propulsion * share
+
+
+def steps_of_growth(filaments: FilamentCollection, system: openmm.System) -> list[TimeStep]:
+    """The TimeStep of ends that push walls or contacts of a System; none if there are no such."""
+    label, rate = _fastest_end(filaments, system)
+    if rate == 0.0:
+        return []
+    reason = f"{label} gains {_PER_SECOND * rate:.3g} monomers per second where it pushes, a fifth in a step"
+    return [TimeStep(SHARE_OF_ON_RATE / rate, reason, {reason: 1.0 / rate}, {reason: SHARE_OF_ON_RATE / rate})]
+
+
+def warn_if_growth_is_not_resolved(filaments: FilamentCollection, system: openmm.System, step: float) -> None:
+    """Issue a TimeStepWarning if an end that may push gains half a monomer or more in a step, in ps."""
+    label, rate = _fastest_end(filaments, system)
+    if step * rate > _LARGEST_SHARE:
+        warnings.warn(
+            f"In a time step of {format_time(step, 4)} {label} gains {step * rate:.3g} monomers: how it pushes walls "
+            f"and contacts is not resolved. Use a step of at most {format_time(_LARGEST_SHARE / rate, 4)}, or better "
+            f"{format_time(SHARE_OF_ON_RATE / rate, 4)}.",
+            TimeStepWarning,
+            stacklevel=4,
+        )
+
+
+def refuse_countless_monomers(filaments: Iterable[Filament], step: float) -> None:
+    """Raise InputError if a filament gains and loses more than 100000 monomers in a step, in ps."""
+    for number, filament in enumerate(filaments):
+        rate = sum(_events(filament, end) for end in ("minus", "plus"))
+        if step * rate > _MOST_EVENTS:
+            raise InputError(
+                f"Filament {number} ({filament.type.name}) gains and loses {_PER_SECOND * rate:.3g} monomers per "
+                f"second, or turns so often, {step * rate:.3g} times in a time step of {format_time(step, 4)}: check "
+                "the units of its rates and of its pool."
+            )
+
+
+def _fastest_end(filaments, system):
+    # Of those that may push, with what it is called.
+    grows = [(number, own) for number, own in enumerate(filaments) if own.growth is not None]
+    if not grows or not any(_may_be_pushed(force) for force in system.getForces()):
+        return "", 0.0
+    rates = [(_rates(own, end)[0], f"the {end} end of filament {i}") for i, own in grows for end in ("plus", "minus")]
+    rate, label = max(rates, key=lambda one: one[0])
+    return label, rate
+
+
+def _may_be_pushed(force):
+    return as_filament_wall_force(force) is not None or as_capsule_contact_force(force) is not None
+
+
+def _events(filament, end):
+    # How many come to an end in 1/ps while it grows, or while it shrinks if that is more.
+    on_rate, off_rate = _rates(filament, end)
+    instability = None if filament.growth is None else filament.growth.instability(end)
+    if instability is None:
+        return on_rate + off_rate
+    back_rate, loss_rate, catastrophe_rate, rescue_rate = instability.rates
+    shrinking = back_rate * filament.growth.pool.concentration + loss_rate + rescue_rate
+    return max(on_rate + off_rate + catastrophe_rate, shrinking)
+
+
+def _rates(filament, end):
+    # Of monomers that come and that go, in 1/ps.
+    if filament.growth is None:
+        return 0.0, 0.0
+    on_rate, off_rate = filament.growth.rates(end)
+    return on_rate * filament.growth.pool.concentration, off_rate
