@@ -29,6 +29,7 @@ from openmm_cylchain.runs.initial_state import build_system
 from openmm_cylchain.runs.relaxation import relaxed_positions
 from openmm_cylchain.runs.run import begin, create_simulation
 from support.configurations import GROWING
+from support.run_figures import rendered
 
 HEAD = '[solvent]\ntemperature = "298 K"\nviscosity = "1 mPa*s"\n'
 MONOMERS = '[[monomers]]\ntype = "ACTIN_ATP"\nconcentration = "5 uM"\n'
@@ -169,7 +170,8 @@ def test_filaments_that_come_apart_before_the_run_do_not_grow():
 def directory(tmp_path_factory):
     path = tmp_path_factory.mktemp("growing")
     (path / "growing.toml").write_text(GROWING)
-    assert main(["run", str(path / "growing.toml"), "--output", str(path / "out")]) == 0
+    with rendered():
+        assert main(["run", str(path / "growing.toml"), "--output", str(path / "out")]) == 0
     return path / "out"
 
 
