@@ -443,7 +443,7 @@ def test_steps_that_resolve_how_ends_push():
         assert any("gains 0.55 monomers" in str(one.message) for one in caught) == warned
         assert all(one.category is TimeStepWarning for one in caught)
     for own in (filaments, growing(growth=growth(plus_instability=turning(shrinking_off_rate=rate)))):
-        with pytest.raises(InputError, match="Filament 0 .*monomers per second.*check the units"):
+        with pytest.raises(InputError, match="Filament 0 .*monomers per second.*Check the units"):
             own.create_integrator(system if own is filaments else own.build()[1], 2e5 / rate)
 
 
@@ -490,9 +490,9 @@ def test_a_context_by_default(tmp_path):
         still.in_context(in_context(still, system, positions)).growth()
 
 
-def test_positions_of_another_length(crowded):
+def test_positions_of_another_length():
     """Segments of the present one have no place there."""
-    filaments, system, positions, _, _ = crowded
+    filaments, system, positions = built(growing())
     context = in_context(filaments, system, positions)
     context.getIntegrator().step(100)
     context.setPositions(positions)
