@@ -8,7 +8,7 @@ from matplotlib.transforms import ScaledTranslation
 
 from ..analysis.filament_shapes import filament_curves
 from ..mechanics.geometry import unrolled
-from ..output.colors import PLUS_END, PLUS_END_COLOR
+from ..output.colors import PLUS_END, PLUS_END_COLOR, colors_of_filaments
 from ..units.text import time_unit
 from .figure_style import FONT_SIZE, legend, length_unit
 
@@ -18,11 +18,14 @@ _NARROWEST = 0.4
 class Conformations:
     """Draws frames of a run, all with one framing.
 
-    Filaments of one [[filament]] table have one colour. In a periodic box, what leaves it goes on at the opposite face.
+    Filaments of one [[filament]] table have one colour, or one for each load. In a periodic box, what leaves it goes on
+    at the opposite face.
 
     Parameters
     ----------
-    groups : list of (FilamentGroup, members, colour)
+    groups : list of (FilamentGroup, members)
+    loads : list of str
+        Of each filament, see ``description.loads_of_filaments``.
     records : (n,) array
         Of linkers, see ``LINKER_RECORD``; empty without them.
     springs : list of (label, colour)
@@ -33,30 +36,39 @@ class Conformations:
         Whether ends are marked.
     """
 
-    def __init__(self, configuration, groups, trajectory, records, springs, frames, polar):
+    def __init__(self, configuration, groups, loads, trajectory, records, springs, frames, polar):
         self._box = None if configuration.box is None else np.array(configuration.box)[:2]
         self._steps = configuration.simulation.steps_per_report
-        self._groups, self._trajectory, self._records = groups, trajectory, records
+        self._trajectory, self._records = trajectory, records
+        self._groups = [
+            (group, load, [own for own in members if loads[own] == load])
+            for group, members in groups
+            for load in dict.fromkeys(loads[own] for own in members)
+        ]
+        kinds = dict.fromkeys((group.table, load) for group, load, _ in self._groups)
+        self._colours = dict(zip(kinds, colors_of_filaments(len(kinds))))
         self._springs, self._polar = springs, polar
-        points = [own[:, :2] for frame in frames for _, _, lines in self._lines(frame) for own in lines]
+        points = [own[:, :2] for frame in frames for *_, lines in self._lines(frame) for own in lines]
         points = np.concatenate(points)
         if self._box is not None:
             points = np.array([np.zeros(2), self._box])
         self._lower, self._upper = points.min(axis=0), points.max(axis=0)
 
     def _lines(self, frame):
-        # Of each group: its label and colour, and the curves of its filaments.
-        for group, members, colour in self._groups:
+        # Of each group and load: the curves of its filaments.
+        for group, load, members in self._groups:
             curves = [own[0] for own in filament_curves(self._trajectory[frame], members)]
-            yield group, colour, [unrolled(own) if group.closed else own for own in curves]
+            yield group, load, [unrolled(own) if group.closed else own for own in curves]
 
     def draw(self, axis, frame):
         """Draw a frame, with a legend and a scale bar below."""
-        tables, ends = {}, []
-        for group, colour, lines in self._lines(frame):
+        named, ends = set(), []
+        for group, load, lines in self._lines(frame):
             segments = np.concatenate([np.stack([own[:-1, :2], own[1:, :2]], axis=1) for own in lines])
-            label = None if group.table in tables else self._label(group)
-            self._draw_segments(axis, segments, tables.setdefault(group.table, colour), 1.8, 2, label)
+            kind = group.table, load
+            label = None if kind in named else self._label(kind)
+            self._draw_segments(axis, segments, self._colours[kind], 1.8, 2, label)
+            named.add(kind)
             ends += [] if group.closed else [own[-1, :2] for own in lines]
         if self._polar and ends:
             places = np.array(ends) if self._box is None else np.mod(ends, self._box)
@@ -77,16 +89,21 @@ class Conformations:
         legend(axis, loc="upper left", bbox_to_anchor=(0.0, -0.01), bbox_transform=below, borderaxespad=0.0)
         _draw_scale_bar(axis)
 
-    def _label(self, group):
-        own = [one for one, *_ in self._groups if one.table == group.table]
-        counts = sorted({one.segments for one in own})
-        kind = group.type.segment_kind.name + "s" * (counts != [1])
+    def _label(self, kind):
+        own = [(group, members) for group, load, members in self._groups if (group.table, load) == kind]
+        (group, _), counts = own[0], sorted({one.segments for one, _ in own})
         text = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+<<<<<<< HEAD
         label = f"{sum(one.count for one in own)} × {group.type.name}, {text} {kind}"
         if group.growth is not None:
             label += " at first"
         differ = len({one.load for one, *_ in self._groups}) > 1
         return f"{label}, {group.load}" if differ and group.load else label
+=======
+        segments = f"{text} {group.type.segment_kind.name}{'s' * (counts != [1])}"
+        label = f"{sum(len(members) for _, members in own)} × {group.type.name}, {segments}"
+        return f"{label}, {kind[1]}" if kind[1] else label
+>>>>>>> rest
 
     def _draw_segments(self, axis, segments, colour, width, order, label):
         if self._box is not None and len(segments):

@@ -27,20 +27,18 @@ def describe(configuration, filaments, system, topology):
         topology=topology,
         diameters=dict(enumerate(diameters, system.getNumParticles() - len(diameters))),
     )
-    loads = _loads(configuration.pulls, len(filaments))
-    return replace(
-        description, filaments=tuple(replace(own, load=load) for own, load in zip(description.filaments, loads))
-    )
+    described = zip(description.filaments, loads_of_filaments(configuration))
+    return replace(description, filaments=tuple(replace(own, load=load) for own, load in described))
 
 
-def _loads(pulls, count):
-    # Of each filament the constant forces on it, as text; empty if they are all alike.
-    found = [[] for _ in range(count)]
-    for pull in pulls:
+def loads_of_filaments(configuration):
+    """Of each filament the constant forces on it, as text; empty if they are all alike."""
+    found = [[] for group in configuration.filaments for _ in range(group.count)]
+    for pull in configuration.pulls:
         for number in pull.filaments:
             found[number].append(_in_words(pull))
     loads = [" + ".join(own) or _NO_LOAD for own in found]
-    return loads if len({*loads}) > 1 else [""] * count
+    return loads if len({*loads}) > 1 else [""] * len(found)
 
 
 def _in_words(pull):

@@ -21,6 +21,7 @@ from ..filaments.straight_segments import STRAIGHT_SEGMENTS
 from ..output.dcd_frames import DCDFrames
 from ..theory import beam_elements
 from ..units.quantities import thermal_energy
+from .description import loads_of_filaments
 from .silence import silenced_c_library
 
 _STRETCHING, _STRETCHING_OF_ELEMENTS = "stretching energy per segment", "stretching energy per element"
@@ -109,8 +110,10 @@ def group_labels(configuration):
         f"{group.type.segment_kind.name}{'s' * (group.segments > 1)}"
         for group in configuration.filaments
     ]
-    if len(set(labels)) < len(labels) and all(group.tension for group in configuration.filaments):
-        labels = [f"{label}, {group.load}" for label, group in zip(labels, configuration.filaments)]
+    loads = loads_of_filaments(configuration)
+    of_groups = [list(dict.fromkeys(loads[number] for number in own)) for own in group_members(configuration)]
+    if len(set(labels)) < len(labels) and any(loads) and all(len(own) == 1 for own in of_groups):
+        labels = [f"{label}, {load}" for label, (load,) in zip(labels, of_groups)]
     if len(set(labels)) < len(labels):
         labels = [f"{label} (table {group.table})" for label, group in zip(labels, configuration.filaments)]
     return labels

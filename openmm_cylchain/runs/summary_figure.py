@@ -23,6 +23,7 @@ from ..units.quantities import PICONEWTON, thermal_energy
 from ..units.text import time_unit
 from .configuration import linker_labels
 from .conformations import Conformations
+from .description import loads_of_filaments
 from .figure_style import FONT_SIZE, legend, legend_below, length_unit
 from .growth_panels import draw_growth
 from .summary import (
@@ -71,15 +72,19 @@ def _draw(configuration, directory, trajectory, network):
             colors_of_filaments(len(configuration.filaments)),
         )
     ]
+<<<<<<< HEAD
     still = [entry for entry, grows in zip(groups, grow) if not grows]
     of_tables = colors_of_filaments(groups[-1][0].table)
+=======
+>>>>>>> rest
     temperature = configuration.solvent.temperature
     energies = read_table(directory.energies)
     labels = linker_labels(configuration)
     colours_of_linkers = spring_colors([own.kind.is_motor for own in configuration.linkers])
     conformations = Conformations(
         configuration,
-        [(group, members, of_tables[group.table - 1]) for group, members, *_ in groups],
+        [(group, members) for group, members, *_ in groups],
+        loads_of_filaments(configuration),
         trajectory,
         read_records(directory.linker_places) if configuration.linkers else np.zeros(0, LINKER_RECORD),
         list(zip(labels, colours_of_linkers)),

@@ -3,6 +3,8 @@
 The process ends when the one that started it is gone, whatever killed that: its standard input is closed then.
 """
 
+import contextlib
+import dataclasses
 import json
 import os
 import signal
@@ -115,21 +117,22 @@ def _last_line(path):
 
 def main():
     """Do the run that standard input describes; return the exit code."""
-    from ..output.run_files import RunFiles
-    from ..runs.configuration import parse_configuration
     from ..runs.run import RunInterrupted
+    from ..runs.run_directory import RunDirectory
     from ..runs.summarised_run import run_with_summary
 
     order = json.loads(sys.stdin.buffer.readline())
     threading.Thread(target=_end_with_the_starter, daemon=True).start()
     try:
-        configuration = parse_configuration(order["text"], order["folder"])
+        directory = RunDirectory(order["directory"])
+        configuration = _read(order["text"], order["folder"], directory)
         # One that a scan which was killed has started is about to write its last checkpoint.
         deadline = time.monotonic() + 2.0 * _SECONDS_TO_END
-        while RunFiles(order["directory"]).is_being_written and time.monotonic() < deadline:
+        while directory.is_being_written and time.monotonic() < deadline:
             time.sleep(0.1)
         print(_platform_in_words(configuration.simulation), flush=True)
-        run_with_summary(configuration, order["directory"], resume=True)
+        with _kept_where_it_fails(configuration, directory):
+            run_with_summary(configuration, directory.path, resume=True)
     except InputError as error:
         print(f"error: {error}", flush=True)
         return _WRONG_INPUT
@@ -140,6 +143,29 @@ def main():
         print(f"interrupted: {interruption}", flush=True)
         return 128 + interruption.signal_number
     return 0
+
+
+def _read(text, folder, directory):
+    from ..runs.configuration import parse_configuration
+
+    try:
+        return dataclasses.replace(parse_configuration(text, folder), path=str(directory.configuration))
+    except InputError as error:
+        # There is no file of it: the scan could read it, and this process, perhaps on another machine, cannot.
+        separator = ", " if str(error).startswith("line ") else ": "
+        raise InputError(f"The configuration of the run in {directory.path}{separator}{error}") from None
+
+
+@contextlib.contextmanager
+def _kept_where_it_fails(configuration, directory):
+    # Errors name lines of the configuration, which a run keeps from its first step on.
+    try:
+        yield
+    except InputError:
+        if not directory.configuration.exists():
+            with contextlib.suppress(InputError), directory:
+                directory.claim(configuration, resume=True)
+        raise
 
 
 def _platform_in_words(settings):

@@ -127,10 +127,25 @@ def rgb_to_luminance(name):
     return linear @ [0.2126, 0.7152, 0.0722]
 
 
-def test_loads_are_named(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    "text, labels",
+    [
+        (TWO_LOADS, ["2 × DNA, 5 segments, 0.2 pN", "1 × DNA, 5 segments, 10 pN"]),
+        # Not all filaments of a table.
+        (
+            TWO_LOADS.replace("table = 1", "filament = 1").replace("table = 2", "filament = 2"),
+            ["1 × DNA, 5 segments, no pull", "1 × DNA, 5 segments, 0.2 pN", "1 × DNA, 5 segments, 10 pN"],
+        ),
+    ],
+    ids=["tables", "filaments"],
+)
+def test_loads_are_named(text, labels, tmp_path, monkeypatch):
     figures, savefig = [], Figure.savefig
     monkeypatch.setattr(
         Figure, "savefig", lambda own, *rest, **options: (figures.append(own), savefig(own, *rest, **options))
     )
-    simulated(tmp_path, TWO_LOADS)
-    assert labels_of(figures[0].axes[0]) == ["2 × DNA, 5 segments, 0.2 pN", "1 × DNA, 5 segments, 10 pN"]
+    run = analysis.load(simulated(tmp_path, text))
+    panel = figures[0].axes[0]
+    assert labels_of(panel) == labels
+    colours = {to_hex(line.get_color()).upper() for line in panel.lines if line.get_label() in labels}
+    assert colours == set(filament_colors(run).values())

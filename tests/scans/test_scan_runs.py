@@ -202,6 +202,16 @@ def is_run_in(number, directory):
         return False
 
 
+def test_errors_of_runs_name_their_file_and_line(tmp_path):
+    """A run that ends before its first step leaves its configuration, too."""
+    text = RUN.replace("DURATION", "1 ms") + 'platform = "no platform"\n'
+    outcome = perform(Task(text, str(tmp_path), str(tmp_path / "out"), attempts=1))
+    file = tmp_path / "out" / "configuration.toml"
+    assert file.read_text() == text
+    line = len(text.splitlines())
+    assert outcome.reason.startswith(f"{file}, line {line}: [simulation] platform must be one of those that OpenMM has")
+
+
 @pytest.mark.slow
 def test_failures_are_named_and_the_others_gathered(tmp_path, capsys):
     text = TWO_RUNS.replace("replicas = 2", "replicas = 1") + '[vary]\nsimulation.time_step = ["0.1 us", "100 us"]\n'

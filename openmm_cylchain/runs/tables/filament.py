@@ -183,11 +183,6 @@ class FilamentGroup:
         return self.type.segment_kind.bends(self.segments, self.closed)
 
     @property
-    def load(self):
-        """The tension of their ends as text, empty without one."""
-        return f"{self.tension[0] / units.PICONEWTON:.3g} pN" if self.tension else ""
-
-    @property
     def linked(self):
         """Whether linkers bind to them."""
         return "linkers" in self.disturbed

@@ -152,8 +152,8 @@ void CylinderChainGrowthForceImpl::refusePlaces() {
         for (const Place& place : other.first->findPlaces(*places))
             for (int particle : {place.first, place.second})
                 require(particle < 0 || !grows[particle], other.first->getOwner().getName()+" acts on particle "+
-                        to_string(particle)+" of a chain that grows, which is not possible yet: walls and contacts "
-                        "of this plugin alone are");
+                        to_string(particle)+" of a chain that grows, which is not possible yet: walls, contacts "
+                        "and linkers of this plugin alone are");
         other.second = version;
     }
 }
@@ -214,13 +214,15 @@ void CylinderChainGrowthForceImpl::setSpareNodes() {
 }
 
 void CylinderChainGrowthForceImpl::refuseForces(const vector<Vec3>& forces) const {
+    const ChainList& list = chains->getDescription().getList();
     for (int number : growing)
-        for (int particle : chains->getDescription().getList().getChain(number).nodes)
-            if (forces[particle] != Vec3())
-                throw OpenMMException("CylinderChainGrowthForce: A Force acts on particle "+to_string(particle)+" of "+
-                        chains->getDescription().getList().getNameInSentence(number)+", which grows, without being "
-                        "in the equations of steps: growth cannot take it into account. Walls and contacts of this "
-                        "plugin alone may act on chains that grow");
+        for (const vector<int>* particles : {&list.getChain(number).nodes, &list.getChain(number).spareNodes})
+            for (int particle : *particles)
+                if (forces[particle] != Vec3())
+                    throw OpenMMException("CylinderChainGrowthForce: A Force acts on particle "+to_string(particle)+
+                            " of "+list.getNameInSentence(number)+", which grows, without being in the equations of "
+                            "steps: growth cannot take it into account. Walls, contacts and linkers of this plugin "
+                            "alone may act on chains that grow");
 }
 
 void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
