@@ -93,17 +93,11 @@ class Conformations:
         own = [(group, members) for group, load, members in self._groups if (group.table, load) == kind]
         (group, _), counts = own[0], sorted({one.segments for one, _ in own})
         text = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-<<<<<<< HEAD
-        label = f"{sum(one.count for one in own)} × {group.type.name}, {text} {kind}"
-        if group.growth is not None:
-            label += " at first"
-        differ = len({one.load for one, *_ in self._groups}) > 1
-        return f"{label}, {group.load}" if differ and group.load else label
-=======
         segments = f"{text} {group.type.segment_kind.name}{'s' * (counts != [1])}"
         label = f"{sum(len(members) for _, members in own)} × {group.type.name}, {segments}"
+        if group.growth is not None:
+            label += " at first"
         return f"{label}, {kind[1]}" if kind[1] else label
->>>>>>> rest
 
     def _draw_segments(self, axis, segments, colour, width, order, label):
         if self._box is not None and len(segments):

@@ -72,11 +72,7 @@ def _draw(configuration, directory, trajectory, network):
             colors_of_filaments(len(configuration.filaments)),
         )
     ]
-<<<<<<< HEAD
     still = [entry for entry, grows in zip(groups, grow) if not grows]
-    of_tables = colors_of_filaments(groups[-1][0].table)
-=======
->>>>>>> rest
     temperature = configuration.solvent.temperature
     energies = read_table(directory.energies)
     labels = linker_labels(configuration)

@@ -227,8 +227,8 @@ void CylinderChainGrowthForceImpl::refuseForces(const vector<Vec3>& forces) cons
 
 void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
     const GrowthSystem& system = owner.getSystem();
-    require(replaced.ranges.size() == growing.size() && replaced.events.size() == 2*growing.size() && replaced.shrinks.size() == 2*growing.size() &&
-            replaced.free.size() == system.pools.size(), "A State or checkpoint has the growth of another number of "
+    require(replaced.ranges.size() == growing.size() && replaced.events.size() == 2*growing.size() &&
+            replaced.shrinks.size() == 2*growing.size() && replaced.free.size() == system.pools.size(), "A State or checkpoint has the growth of another number of "
             "chains or pools");
     ChainList& list = chains->getGrowingList();
     for (size_t i = 0; i < growing.size(); i++) {
