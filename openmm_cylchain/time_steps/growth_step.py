@@ -74,7 +74,7 @@ def refuse_countless_monomers(filaments: Iterable[Filament], step: float) -> Non
         if step * rate > _MOST_EVENTS:
             raise InputError(
                 f"Filament {number} ({filament.type.name}) gains and loses {_PER_SECOND * rate:.3g} monomers per "
-                f"second, or turns so often, {step * rate:.3g} times in a time step of {format_time(step, 4)}: check "
+                f"second, or turns so often: {step * rate:.3g} times in a time step of {format_time(step, 4)}. Check "
                 "the units of its rates and of its pool."
             )
 
