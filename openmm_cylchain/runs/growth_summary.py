@@ -28,7 +28,7 @@ class EndSummary:
     rate, rate_error : float
         Monomers that an end gained in a second, less those that it lost, on average.
     rate_of_free_ends : float
-        k_on c - k_off in 1/s, at the mean concentration.
+        See ``free_rate``, at the mean concentration.
     """
 
     name: str
@@ -67,9 +67,18 @@ def growing_groups(configuration, members):
 
 
 def free_rate(growth, end, concentration):
-    """k_on c - k_off in 1/s of a "plus" or "minus" end, at a concentration in umol/l."""
+    """k_on c - k_off in 1/s of a "plus" or "minus" end, at a concentration in umol/l.
+
+    Of dynamic instability, the mean over the times that the end grows and shrinks.
+    """
     on, off = growth.rates(end)
-    return (on * concentration * MICROMOLAR - off) * _SECOND
+    rate = on * concentration * MICROMOLAR - off
+    turning = growth.instability(end)
+    if turning is not None and turning.catastrophe_rate + turning.rescue_rate > 0.0:
+        shrinking = turning.shrinking_on_rate * concentration * MICROMOLAR - turning.shrinking_off_rate
+        both = turning.catastrophe_rate + turning.rescue_rate
+        rate = (rate * turning.rescue_rate + shrinking * turning.catastrophe_rate) / both
+    return rate * _SECOND
 
 
 def summarise_growth(configuration, members, directory):

@@ -199,7 +199,8 @@ def box_vectors(box):
 def _add(filaments, group, nodes, control_points, kinetics):
     growth = group.growth
     if growth is not None and not kinetics:
-        growth = replace(growth, monomers=Monomers(length=growth.monomers.length))
+        still = Monomers(length=growth.monomers.length)
+        growth = replace(growth, monomers=still, plus_instability=None, minus_instability=None)
     filaments.add_nodes(
         group.type,
         nodes,

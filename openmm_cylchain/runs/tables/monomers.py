@@ -4,7 +4,7 @@ import dataclasses
 from dataclasses import dataclass
 
 from ...engine_choice import choose_engine
-from ...filaments.growth import Growth, MonomerPool, Monomers
+from ...filaments.growth import DynamicInstability, Growth, MonomerPool, Monomers
 from ...filaments.presets import ACTIN_ATP, TUBULIN
 from ...time_steps.schemes import IMPLICIT_SCHEMES
 from ...units import quantities as units
@@ -18,6 +18,7 @@ PRESETS = {"ACTIN_ATP": ACTIN_ATP, "TUBULIN": TUBULIN}
 """Monomers by the names that a configuration uses."""
 
 _RATES = ("plus_on_rate", "plus_off_rate", "minus_on_rate", "minus_off_rate")
+_INSTABILITY = ("catastrophe_rate", "rescue_rate", "shrinking_off_rate")
 GROWTH_EXAMPLE = '{ longest = "5 um" }'
 
 MONOMERS = TableKind(
@@ -62,6 +63,14 @@ GROWTH = TableKind(
         Key("shortest", Quantity(units.LENGTH), None, "To which it shrinks at most; half a segment if not given."),
         Key("plus_capped", Flag(), False, "Whether the end at the last node neither gains nor loses monomers."),
         Key("minus_capped", Flag(), False, "Whether that at the first node does not."),
+        Key(
+            "catastrophe_rate",
+            Quantity(units.RATE, "zero"),
+            None,
+            "At which the plus end begins to shrink, if it grows and shrinks in turn: see `DynamicInstability`.",
+        ),
+        Key("rescue_rate", Quantity(units.RATE, "zero"), None, "At which it begins to grow again."),
+        Key("shrinking_off_rate", Quantity(units.RATE, "zero"), None, "How many monomers it loses while it shrinks."),
     ),
     "How filaments grow and shrink at their ends, see `Growth`.",
 )
@@ -124,10 +133,15 @@ def read_growth(entries, monomers):
     if len(found) > 1:
         names = ", ".join(own.name for own in monomers)
         raise entries.error(f"lacks the key 'monomers': there are {names}.")
+    turning = entries.given(*_INSTABILITY)
+    missing = [name for name in _INSTABILITY if name not in turning]
+    if turning and missing:
+        raise entries.error(f"lacks the key {missing[0]!r}: an end that grows and shrinks in turn has all three rates.")
     with entries.naming():
         return Growth(
             monomers=found[0].monomers,
             pool=found[0].pool,
+            plus_instability=DynamicInstability(**turning) if turning else None,
             **{name: entries[name] for name in ("longest", "shortest", "plus_capped", "minus_capped")},
         )
 

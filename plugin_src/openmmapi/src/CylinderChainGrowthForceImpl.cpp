@@ -17,7 +17,7 @@ using namespace std;
 
 static const char* const PARAMETER = "CylinderChainGrowth";
 
-static void require(bool condition, const string& message) {
+static void requireOfGrowing(bool condition, const string& message) {
     if (!condition)
         throw OpenMMException("CylinderChainGrowthForce: "+message);
 }
@@ -50,19 +50,19 @@ void CylinderChainGrowthForceImpl::initialize(ContextImpl& context) {
     this->context = &context;
     const System& system = context.getSystem();
     for (ForceImpl* impl : context.getForceImpls()) {
-        require(impl == this || dynamic_cast<CylinderChainGrowthForceImpl*>(impl) == NULL,
+        requireOfGrowing(impl == this || dynamic_cast<CylinderChainGrowthForceImpl*>(impl) == NULL,
                 "The System has two of them: let all chains grow by one");
         if (dynamic_cast<CylinderChainForceImpl*>(impl) != NULL)
             chains = dynamic_cast<CylinderChainForceImpl*>(impl);
     }
-    require(chains != NULL, "The System has no CylinderChainForce with chains that could grow");
+    requireOfGrowing(chains != NULL, "The System has no CylinderChainForce with chains that could grow");
     const CylinderChainIntegrator* const integrator = dynamic_cast<const CylinderChainIntegrator*>(
             &context.getIntegrator());
-    require(integrator != NULL && isImplicit(static_cast<Scheme>(integrator->getScheme())),
+    requireOfGrowing(integrator != NULL && isImplicit(static_cast<Scheme>(integrator->getScheme())),
             "Chains that grow need a CylinderChainIntegrator with an implicit scheme");
     const string platform = context.getPlatform().getName();
-    require(platform == "Reference" || platform == "CPU", "Chains grow on the Reference and CPU platforms, not on "+
-            platform);
+    requireOfGrowing(platform == "Reference" || platform == "CPU",
+            "Chains grow on the Reference and CPU platforms, not on "+platform);
     seed = (uint32_t) integrator->getRandomNumberSeed();
     if (seed == 0)
         seed = (uint32_t) osrngseed();
@@ -77,8 +77,11 @@ void CylinderChainGrowthForceImpl::initialize(ContextImpl& context) {
     for (int i = 0; i < system.getNumParticles(); i++)
         if (system.isVirtualSite(i))
             for (int k = 0; k < system.getVirtualSite(i).getNumParticles(); k++)
-                require(!grows[system.getVirtualSite(i).getParticle(k)], "Virtual site "+to_string(i)+" is on a chain "
-                        "that grows, which moves along its particles: no attachments and beads are possible there");
+                requireOfGrowing(!grows[system.getVirtualSite(i).getParticle(k)],
+                        "Virtual site "+to_string(i)+
+                                " is on a chain "
+                                "that grows, which moves along its particles: no attachments and beads are possible "
+                                "there");
     places.reset(new PlaceResolver(system));
     kernel = context.getPlatform().createKernel(UpdateCylinderChainGrowthKernel::Name(), context);
     vector<BendingModel> bending;
@@ -151,9 +154,10 @@ void CylinderChainGrowthForceImpl::refusePlaces() {
                 grows[particle] = true;
         for (const Place& place : other.first->findPlaces(*places))
             for (int particle : {place.first, place.second})
-                require(particle < 0 || !grows[particle], other.first->getOwner().getName()+" acts on particle "+
-                        to_string(particle)+" of a chain that grows, which is not possible yet: walls, contacts "
-                        "and linkers of this plugin alone are");
+                requireOfGrowing(particle < 0 || !grows[particle],
+                        other.first->getOwner().getName()+" acts on particle "+to_string(particle)+
+                                " of a chain that grows, which is not possible yet: walls, contacts "
+                                "and linkers of this plugin alone are");
         other.second = version;
     }
 }
@@ -185,7 +189,7 @@ void CylinderChainGrowthForceImpl::updateContextState(ContextImpl& context, bool
         throw OpenMMException(string("CylinderChainContactForce: ")+error.what());
     }
     accept();
-    require(failed == -1, "Chains gain and lose more than a million monomers within a step, among them chain "+
+    requireOfGrowing(failed == -1, "Chains gain and lose more than a million monomers within a step, among them chain "+
             to_string(failed == -1 ? -1 : growing[failed])+": use a smaller step, or look at the rates");
     if (changed.empty())
         return;
@@ -227,15 +231,16 @@ void CylinderChainGrowthForceImpl::refuseForces(const vector<Vec3>& forces) cons
 
 void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
     const GrowthSystem& system = owner.getSystem();
-    require(replaced.ranges.size() == growing.size() && replaced.events.size() == 2*growing.size() &&
-            replaced.shrinks.size() == 2*growing.size() && replaced.free.size() == system.pools.size(), "A State or checkpoint has the growth of another number of "
+    requireOfGrowing(replaced.ranges.size() == growing.size() && replaced.events.size() == 2*growing.size() &&
+                    replaced.shrinks.size() == 2*growing.size() && replaced.free.size() == system.pools.size(),
+            "A State or checkpoint has the growth of another number of "
             "chains or pools");
     ChainList& list = chains->getGrowingList();
     for (size_t i = 0; i < growing.size(); i++) {
         const MonomerRange& range = replaced.ranges[i];
         const Chain& chain = list.getChain(growing[i]);
         const int most = chain.nodes.size()+chain.spareNodes.size();
-        require(range.first < range.last && range.size() >= system.chains[i].leastMonomers &&
+        requireOfGrowing(range.first < range.last && range.size() >= system.chains[i].leastMonomers &&
                 SegmentDivision(range, system.tables[system.chains[i].table].monomersPerSegment).countSegments() <
                 most, "Chain "+to_string(growing[i])+" cannot have monomers "+to_string(range.first)+" to "+
                 to_string(range.last)+": it has "+to_string(most)+" particles, and needs "+
@@ -252,14 +257,14 @@ void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
 }
 
 void CylinderChainGrowthForceImpl::setEnds(const vector<int>& ends) {
-    require(ends.size() == 2*growing.size(), "There must be two numbers for each chain that grows");
+    requireOfGrowing(ends.size() == 2*growing.size(), "There must be two numbers for each chain that grows");
     GrowthState replaced = state;
     for (size_t i = 0; i < growing.size(); i++) {
         replaced.ranges[i] = {ends[2*i], ends[2*i+1]};
         replaced.free[owner.getSystem().chains[i].pool] -= replaced.ranges[i].size()-state.ranges[i].size();
     }
     for (size_t pool = 0; pool < replaced.free.size(); pool++)
-        require(!owner.getSystem().pools[pool].isClosed() || replaced.free[pool] >= 0, "Pool "+to_string(pool)+
+        requireOfGrowing(!owner.getSystem().pools[pool].isClosed() || replaced.free[pool] >= 0, "Pool "+to_string(pool)+
                 " has not so many monomers");
     setState(replaced);
 }
