@@ -240,3 +240,15 @@ def test_microtubules_grow_and_shrink_with_the_mean_speed_of_dynamic_instability
     assert state.catastrophes.sum() > 1000 and not state.catastrophes[:, 0].any()
     assert 0.12 < state.shrinking[:, 1].mean() < 0.55
     assert not state.gained[:, 0].any()
+
+
+def test_spare_nodes_follow_where_energies_are_minimised():
+    filaments = Filaments(1e-3 * unit.pascal * unit.second, TEMPERATURE)
+    filaments.add_equilibrium(ACTIN, 4, 1, growth=growth((4e3, 2e3), longest=2.0 * unit.micrometer))
+    topology, system, positions = filaments.build()
+    context, integrator = simulate(filaments, system, positions, 0.1 * unit.millisecond)
+    integrator.step(5)
+    openmm.LocalEnergyMinimizer.minimize(context, 1e-3)
+    where = context.getState(positions=True).getPositions(asNumpy=True)._value
+    spare = where[filaments.node_indices[0]][filaments.in_context(context).growth().nodes[0] - 1 :]
+    assert len(spare) > 10 and np.all(spare == spare[0])

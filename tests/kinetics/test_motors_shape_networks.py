@@ -12,7 +12,7 @@ from openmm_cylchain import MICROTUBULE, Crosslinker, Cylinder, Filaments, Hand,
 from support.contexts import new_context, positions_of
 
 MILLISECOND = 1e3
-BUNDLE = BundleSystem(filaments=30, motors=200, crosslinkers=100, length=3000.0)
+BUNDLE = BundleSystem(filaments=30, motors=400, crosslinkers=100, length=3000.0)
 
 
 def _shortening(system, positions, step, seeds):

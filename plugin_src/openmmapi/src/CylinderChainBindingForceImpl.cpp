@@ -12,6 +12,7 @@
 #include "openmm/internal/LinkDescription.h"
 #include "openmm/internal/LinkerDescription.h"
 #include "openmm/internal/OSRngSeed.h"
+#include "openmm/internal/StateDigest.h"
 #include "openmm/reference/SimTKOpenMMRealType.h"
 #include <algorithm>
 #include <cmath>
@@ -26,29 +27,18 @@ static const size_t MOST_SPACINGS = 16;
 /** Numbers of linkers are below 2^31, also of those that come out of their concentration in one more step. */
 static const uint32_t LAST_NUMBER = 2000000000;
 
-/**
- * Compute a number by which linkers are told from those of another time, or of a Context to which other things have
- * happened: below 2^52, so that it is exact as the value of a parameter.
- */
 static double digestOf(const cylchain::LinkerState& state) {
-    uint64_t digest = 0;
-    auto mix = [&] (uint64_t value) {
-        // One round of the generator splitmix64.
-        digest += value+0x9e3779b97f4a7c15ull;
-        digest = (digest^(digest>>30))*0xbf58476d1ce4e5b9ull;
-        digest = (digest^(digest>>27))*0x94d049bb133111ebull;
-        digest ^= digest>>31;
-    };
-    mix(state.steps);
-    mix(state.nextNumber);
+    StateDigest digest;
+    digest.mix(state.steps);
+    digest.mix(state.nextNumber);
     // Before the first step, there are no counts of events.
     for (size_t type = 0; type < state.events.size(); type++)
         if (state.events[type].bindings+state.events[type].unbindings > 0) {
-            mix(type);
-            mix(state.events[type].bindings);
-            mix(state.events[type].unbindings);
+            digest.mix(type);
+            digest.mix(state.events[type].bindings);
+            digest.mix(state.events[type].unbindings);
         }
-    return (double) (digest>>12);
+    return digest.get();
 }
 
 static void require(bool condition, const string& message) {

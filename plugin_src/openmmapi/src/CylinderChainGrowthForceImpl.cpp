@@ -7,6 +7,7 @@
 #include "openmm/VirtualSite.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/OSRngSeed.h"
+#include "openmm/internal/StateDigest.h"
 #include "openmm/reference/SimTKOpenMMRealType.h"
 #include <algorithm>
 #include <stdexcept>
@@ -22,24 +23,16 @@ static void requireOfGrowing(bool condition, const string& message) {
         throw OpenMMException("CylinderChainGrowthForce: "+message);
 }
 
-/** Compute a number by which growth is told from that of another time or Context: below 2^52. */
 static double digestOf(const GrowthState& state) {
-    uint64_t digest = 0;
-    auto mix = [&] (uint64_t value) {
-        // One round of the generator splitmix64.
-        digest += value+0x9e3779b97f4a7c15ull;
-        digest = (digest^(digest>>30))*0xbf58476d1ce4e5b9ull;
-        digest = (digest^(digest>>27))*0x94d049bb133111ebull;
-        digest ^= digest>>31;
-    };
-    mix(state.steps);
+    StateDigest digest;
+    digest.mix(state.steps);
     for (const MonomerRange& range : state.ranges) {
-        mix((uint32_t) range.first);
-        mix((uint32_t) range.last);
+        digest.mix((uint32_t) range.first);
+        digest.mix((uint32_t) range.last);
     }
     for (char shrinks : state.shrinks)
-        mix(shrinks != 0 ? 1 : 0);
-    return (double) (digest>>12);
+        digest.mix(shrinks != 0 ? 1 : 0);
+    return digest.get();
 }
 
 CylinderChainGrowthForceImpl::CylinderChainGrowthForceImpl(const CylinderChainGrowthForce& owner) :
@@ -205,6 +198,14 @@ void CylinderChainGrowthForceImpl::updateContextState(ContextImpl& context, bool
     if (otherNodes)
         setSpareNodes();
     forcesInvalid = true;
+}
+
+double CylinderChainGrowthForceImpl::calcForcesAndEnergy(ContextImpl& context, bool, bool, int) {
+    follow();
+    // Whoever has moved nodes, such as a minimizer, has left spare ones behind.
+
+    kernel.getAs<UpdateCylinderChainGrowthKernel>().placeSpareNodes(context, chains->getDescription().getChains());
+    return 0.0;
 }
 
 void CylinderChainGrowthForceImpl::setSpareNodes() {

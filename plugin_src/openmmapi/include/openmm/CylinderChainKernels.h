@@ -305,6 +305,10 @@ public:
     virtual int execute(ContextImpl& context, cylchain::GrowthState& state, cylchain::GrowthStep step, bool periodic,
             cylchain::ChainList& chains, const std::vector<cylchain::Surroundings*>& around,
             std::vector<int>& changed) = 0;
+    /**
+     * Put spare nodes where the last nodes of their chains are.
+     */
+    virtual void placeSpareNodes(ContextImpl& context, const std::vector<cylchain::Chain>& chains) = 0;
 };
 
 /**

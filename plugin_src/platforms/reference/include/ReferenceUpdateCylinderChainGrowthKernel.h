@@ -20,6 +20,7 @@ public:
             const std::vector<cylchain::StretchingModel>& stretching, const std::vector<char>& planar);
     int execute(ContextImpl& context, cylchain::GrowthState& state, cylchain::GrowthStep step, bool periodic,
             cylchain::ChainList& chains, const std::vector<cylchain::Surroundings*>& around, std::vector<int>& changed);
+    void placeSpareNodes(ContextImpl& context, const std::vector<cylchain::Chain>& chains);
 private:
     std::unique_ptr<cylchain::ChainGrowth> growth;
 };

@@ -17,3 +17,10 @@ int ReferenceUpdateCylinderChainGrowthKernel::execute(ContextImpl& context, Grow
     step.takesNearestImages = periodic;
     return growth->advance(state, step, chains, &(*data.positions)[0][0], around, changed);
 }
+
+void ReferenceUpdateCylinderChainGrowthKernel::placeSpareNodes(ContextImpl& context, const vector<Chain>& chains) {
+    vector<Vec3>& positions = *extractData(context).positions;
+    for (const Chain& chain : chains)
+        for (int spare : chain.spareNodes)
+            positions[spare] = positions[chain.nodes.back()];
+}

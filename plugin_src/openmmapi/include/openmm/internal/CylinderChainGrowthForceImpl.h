@@ -32,10 +32,7 @@ public:
         return owner;
     }
     void updateContextState(ContextImpl& context, bool& forcesInvalid);
-    double calcForcesAndEnergy(ContextImpl&, bool, bool, int) {
-        follow();
-        return 0.0;
-    }
+    double calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups);
     std::map<std::string, double> getDefaultParameters();
     std::vector<std::string> getKernelNames();
     /**
