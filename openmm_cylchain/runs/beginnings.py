@@ -35,10 +35,13 @@ def write_start(kind, path=None):
     path = Path(f"{kind}.toml" if path is None else path)
     if not path.parent.is_dir():
         raise InputError(f"{path} is in {path.parent}, which is not a directory.")
-    text = start_text(kind)
+    text = start_text(kind).replace(f"{kind}.toml", path.name)
+    # In commands, runs and films have the name of the file.
+    for before, after in (("--output ", "\n"), ("render ", " "), ("--output ", ".gif\n")):
+        text = text.replace(f"{before}{kind}{after}", f"{before}{path.stem}{after}")
     try:
         with open(path, "x", encoding="utf-8", newline="\n") as file:
-            file.write(text.replace(f"{kind}.toml", path.name).replace(f"--output {kind}\n", f"--output {path.stem}\n"))
+            file.write(text)
     except FileExistsError:
         raise InputError(f"{path} exists already: name another file.") from None
     return path

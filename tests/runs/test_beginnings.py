@@ -43,6 +43,9 @@ def test_new_configurations_run(tmp_path, kind, monkeypatch, capsys):
 
 def test_new_does_not_overwrite(tmp_path, capsys):
     path = tmp_path / "mine.toml"
+    assert main(["new", "treadmilling", str(path)]) == 0
+    assert "render mine --film --output mine.gif\n" in path.read_text()
+    path.unlink()
     assert main(["new", "dna", str(path)]) == 0
     assert "run mine.toml --output mine\n" in path.read_text()
     path.write_text("x")
