@@ -18,8 +18,8 @@ struct EndRates {
 };
 
 /**
- * An end: its rates, and those while it shrinks if it does so in turn (dynamic instability), with the rates, in 1/ps, at
- * which it begins to shrink and at which it is rescued.
+ * An end: its rates, and those while it shrinks if it does so in turn (dynamic instability), with the rates, in 1/ps,
+ * at which it begins to shrink and at which it is rescued.
  */
 struct GrowingEnd : EndRates {
     EndRates shrinking = {};

@@ -684,7 +684,7 @@ static void testRodInTheWay() {
 }
 
 int main() {
-    return runTests({testDivision, testFreeEnds, testRodBeforeWall, testPool, testDynamicInstability, testOrder, testContacts,
-            testLinks,
+    return runTests({testDivision, testFreeEnds, testRodBeforeWall, testPool, testDynamicInstability, testOrder,
+            testContacts, testLinks,
             testRodInTheWay});
 }
