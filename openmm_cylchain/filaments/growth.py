@@ -16,6 +16,7 @@ from ..units.quantities import (
     ON_RATE,
     RATE,
     VOLUME,
+    as_number_density,
     in_units_of,
     non_negative,
     positive,
@@ -296,13 +297,6 @@ class Growth:
         per_segment = self.monomers_per_segment(filament_type)
         most = int(np.ceil(self.longest / self.monomers.length))
         return max(0, most - 2 * (per_segment // 2)) // per_segment + 3
-
-
-def as_number_density(concentration: Scalar, name: str) -> float:
-    """A number of molecules in 1 nm^3, of a number or an amount of substance in a volume."""
-    if isinstance(concentration, unit.Quantity) and concentration.unit.is_compatible(unit.molar):
-        concentration = concentration * unit.AVOGADRO_CONSTANT_NA
-    return non_negative(concentration, NUMBER_DENSITY, name)
 
 
 def _as_on_rate(rate, name):

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import openmm
-from openmm import unit
 
 from ..errors import InputError, LinkerWarning
 from ..units.quantities import (
     LENGTH,
-    NUMBER_DENSITY,
     VOLUME,
+    as_number_density,
     in_units_of,
-    non_negative,
     positive,
     thermal_energy,
     whole_number,
@@ -114,7 +112,7 @@ def as_linkers(
         places = _as_anchors(anchors, label)
         return Linkers(kind, len(places), None, None, places, _as_bound(bound, len(places), label), seed)
     if concentration is not None:
-        density = _as_density(concentration, f"{label} concentration")
+        density = as_number_density(concentration, f"{label} concentration")
         if bound:
             raise InputError(f"{label} give a count if some of them are to begin bound.")
         return Linkers(kind, 0, density, None, None, 0, seed)
@@ -185,13 +183,6 @@ def _as_bound(bound, count, label):
     if number > count:
         raise InputError(f"{label} {number} are to begin bound, but there are only {count}.")
     return number
-
-
-def _as_density(concentration, name):
-    # A number of linkers in a volume, or an amount of substance such as 1 uM.
-    if isinstance(concentration, unit.Quantity) and concentration.unit.is_compatible(unit.molar):
-        concentration = concentration * unit.AVOGADRO_CONSTANT_NA
-    return non_negative(concentration, NUMBER_DENSITY, name)
 
 
 def _as_anchors(anchors, label):

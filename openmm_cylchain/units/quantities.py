@@ -138,6 +138,13 @@ def non_negative(value: Scalar, target: unit.Unit, name: str) -> float:
     return _of_size(converted, name)
 
 
+def as_number_density(concentration: Scalar, name: str) -> float:
+    """A number of molecules in 1 nm^3, of a number or an amount of substance in a volume."""
+    if isinstance(concentration, unit.Quantity) and concentration.unit.is_compatible(unit.molar):
+        concentration = concentration * unit.AVOGADRO_CONSTANT_NA
+    return non_negative(concentration, NUMBER_DENSITY, name)
+
+
 def _single_number(value, target, name):
     converted = in_units_of(value, target, name)
     if not isinstance(converted, float):

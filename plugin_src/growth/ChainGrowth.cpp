@@ -147,6 +147,17 @@ bool ChainGrowth::takeTurns(GrowthState& state, const GrowthStep& step, const ve
     return false;
 }
 
+/** Find the monomers of a chain after an event. */
+MonomerRange ChainGrowth::findRange(const GrowthState& state, const Event& event) const {
+    MonomerRange range = state.ranges[event.index];
+    const int change = event.gains() ? 1 : -1;
+    if (event.end == 1)
+        range.last += change;
+    else
+        range.first -= change;
+    return range;
+}
+
 /** Let an end begin to shrink, or to grow again. */
 void ChainGrowth::switchEnd(GrowthState& state, const Event& event) const {
     const size_t end = 2*event.index+event.end;
@@ -196,11 +207,7 @@ void ChainGrowth::apply(GrowthState& state, const GrowthStep& step, const Event&
         if (node < chain.fixed.size() && chain.fixed[node])
             return;
     }
-    MonomerRange range = state.ranges[event.index];
-    if (event.end == 1)
-        range.last += event.gains() ? 1 : -1;
-    else
-        range.first += event.gains() ? -1 : 1;
+    const MonomerRange range = findRange(state, event);
     vector<double> alongBefore, alongAfter;
     if (!around.empty()) {
         alongBefore = findLengths(event.index, state.ranges[event.index]);
@@ -243,12 +250,8 @@ bool ChainGrowth::propose(const GrowthState& state, const GrowthStep& step, cons
             system.tables[system.chains[index].table].monomersPerSegment;
     const bool flat = planar[index];
     const double kT = step.kT;
-    MonomerRange range = state.ranges[index];
-    const SegmentDivision old(range, perSegment);
-    if (end == 1)
-        range.last += event.gains() ? 1 : -1;
-    else
-        range.first += event.gains() ? -1 : 1;
+    const SegmentDivision old(state.ranges[index], perSegment);
+    const MonomerRange range = findRange(state, event);
     if (range.size() < 1)
         return false;
     const SegmentDivision next(range, perSegment);

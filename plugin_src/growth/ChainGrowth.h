@@ -148,6 +148,7 @@ private:
     double getRate(const GrowthState& state, const Event& event) const;
     bool takeTurns(GrowthState& state, const GrowthStep& step, const std::vector<int>& members, std::uint32_t number,
             ChainList& chains, double* positions, const std::vector<Surroundings*>& around);
+    MonomerRange findRange(const GrowthState& state, const Event& event) const;
     void switchEnd(GrowthState& state, const Event& event) const;
     void apply(GrowthState& state, const GrowthStep& step, const Event& event, RandomNumbers& random,
             ChainList& chains, const double* positions, const std::vector<Surroundings*>& around);
