@@ -20,7 +20,7 @@ void Contours::add(const Chain& own) {
         contour.length += length;
         same = same && length == own.segments[0].restLength;
     }
-    contour.ofSegments = same ? own.segments[0].restLength : 0;
+    contour.ofSegments = same && !own.segments.empty() ? own.segments[0].restLength : 0;
     chains.push_back(contour);
 }
 

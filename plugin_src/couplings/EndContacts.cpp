@@ -6,6 +6,8 @@ using namespace cylchain;
 using namespace std;
 
 void EndContacts::Body::bound() {
+    if (nodes.empty())
+        return;
     Vec3d lower = nodes[0], upper = nodes[0];
     for (const Vec3d& node : nodes) {
         lower = {min(lower.x, node.x), min(lower.y, node.y), min(lower.z, node.z)};
@@ -71,14 +73,17 @@ void EndContacts::findNear(const EndChange& change, int own, Near& near) const {
     };
     addEnd(change.before, change.segmentsBefore);
     addEnd(change.after, change.segmentsAfter);
-    const double motion = sqrt((starts[0]-starts[change.segmentsBefore]).squared());
+    const bool isWhole = change.segmentsBefore == 0 || change.segmentsAfter == 0;
+    const double motion = isWhole ? 0 : sqrt((starts[0]-starts[change.segmentsBefore]).squared());
     const double extent = sqrt(square)+known[own].radius;
     for (size_t i = 0; i < known.size(); i++) {
         const Body& body = known[i];
+        if (body.nodes.empty())
+            continue;
         const double room = extent+body.extent;
         // A chain longer than half a box has images on all sides of itself.
-        const bool isWhole = box == nullptr || 2*body.extent < min({box[0], box[4], box[8]});
-        if (isWhole && toNearestImage(body.centre-centre).squared() > room*room)
+        const bool isOneImage = box == nullptr || 2*body.extent < min({box[0], box[4], box[8]});
+        if (isOneImage && toNearestImage(body.centre-centre).squared() > room*room)
             continue;
         const int count = body.countCapsules(), changing = static_cast<int>(i) == own ? change.segmentsBefore : 0;
         auto changes = [&] (int capsule) {
@@ -249,15 +254,17 @@ double EndContacts::findChange(const EndChange& change) {
     findNear(change, own, near);
     if (isAlone(change, near, own))
         return 0;
-    if (crosses(change, near, own))
+    if (change.segmentsBefore > 0 && change.segmentsAfter > 0 && crosses(change, near, own))
         return HUGE_VAL;
     return findEnergy(change, near, own, change.after)-findEnergy(change, near, own, change.before);
 }
 
-void EndContacts::accept(const EndChange& change) {
-    const int own = findBody(change.chain);
+void EndContacts::show(int chain, const vector<Vec3d>& nodes, const vector<double>&) {
+    const int own = findBody(chain);
     if (own == static_cast<int>(growing.size()))
         return;
-    known[own].nodes = change.after;
+    known[own].nodes = nodes;
+    if (nodes.size() < 2)
+        known[own].nodes.clear();
     known[own].bound();
 }

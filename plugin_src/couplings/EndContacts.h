@@ -24,7 +24,7 @@ public:
     }
     void begin(const double* positions, const ChainList& chains, const double* box) override;
     double findChange(const EndChange& change) override;
-    void accept(const EndChange& change) override;
+    void show(int chain, const std::vector<Vec3d>& nodes, const std::vector<double>& along) override;
 private:
     /** A body: its nodes, those of a closed chain with the first once more, or the centre of a sphere. */
     struct Body {

@@ -12,7 +12,7 @@ namespace {
 bool locateAlong(const vector<Vec3d>& nodes, const vector<double>& along, double length, Vec3d& place) {
     // Rounding does not take a hand off an end.
     const double slack = 1e-9*(fabs(length)+1);
-    if (length < along.front()-slack || length > along.back()+slack)
+    if (along.size() < 2 || length < along.front()-slack || length > along.back()+slack)
         return false;
     const size_t last = along.size()-2;
     const size_t segment = min<size_t>(last, max<ptrdiff_t>(0, upper_bound(along.begin(), along.end(), length)-
@@ -28,9 +28,13 @@ void EndLinks::begin(const double* ofStep, const ChainList&, const double* boxOf
     positions = ofStep;
     box = boxOfStep;
     links.clear();
-    ofChain.clear();
     changed.clear();
     find(links);
+    sortByChains();
+}
+
+void EndLinks::sortByChains() {
+    ofChain.clear();
     for (size_t i = 0; i < links.size(); i++)
         for (int end = 0; end < 2; end++)
             if (links[i].ends[end].chain >= 0 && (end == 0 || links[i].ends[0].chain != links[i].ends[1].chain))
@@ -70,7 +74,9 @@ double EndLinks::findChange(const EndChange& change) {
         return 0;
     // What is before the segments that change stays where it is.
     const size_t count = change.before.size();
-    const double staying = change.alongBefore[change.end == 1 ? count-1-change.segmentsBefore : change.segmentsBefore];
+    const bool isWhole = change.segmentsBefore == 0 || change.segmentsAfter == 0;
+    const double staying = isWhole ? -HUGE_VAL :
+            change.alongBefore[change.end == 1 ? count-1-change.segmentsBefore : change.segmentsBefore];
     double difference = 0;
     for (int i : found->second) {
         const bool isMoved = any_of(links[i].ends, links[i].ends+2, [&] (const LinkEnd& end) {
@@ -82,6 +88,14 @@ double EndLinks::findChange(const EndChange& change) {
     return difference;
 }
 
-void EndLinks::accept(const EndChange& change) {
-    changed[change.chain] = {change.after, change.alongAfter};
+void EndLinks::show(int chain, const vector<Vec3d>& nodes, const vector<double>& along) {
+    changed[chain] = {nodes, along};
+}
+
+void EndLinks::move(int chain, int other, double beyond) {
+    for (GrowingLink& link : links)
+        for (LinkEnd& end : link.ends)
+            if (end.chain == chain && end.along > beyond)
+                end.chain = other;
+    sortByChains();
 }

@@ -39,13 +39,15 @@ public:
     }
     void begin(const double* positions, const ChainList& chains, const double* box) override;
     double findChange(const EndChange& change) override;
-    void accept(const EndChange& change) override;
+    void show(int chain, const std::vector<Vec3d>& nodes, const std::vector<double>& along) override;
+    void move(int chain, int other, double beyond) override;
 private:
     /** The nodes of a chain that has changed in this step, and where they are along it. */
     struct Changed {
         std::vector<Vec3d> nodes;
         std::vector<double> along;
     };
+    void sortByChains();
     bool locateEnd(const LinkEnd& end, const EndChange* change, bool isAfter, Vec3d& place) const;
     double findEnergy(const GrowingLink& link, const EndChange& change, bool isAfter) const;
     const std::function<void(std::vector<GrowingLink>&)> find;

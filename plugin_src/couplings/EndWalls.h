@@ -18,10 +18,10 @@ public:
         // Nodes are all that it acts on.
     }
     double findChange(const EndChange& change) override;
-    void accept(const EndChange&) override {
+    void show(int, const std::vector<Vec3d>&, const std::vector<double>&) override {
     }
 private:
-    double findEnergy(const std::vector<Vec3d>& nodes, int end, int segments, double radius) const;
+    double findEnergy(const std::vector<Vec3d>& nodes, int end, int count, double radius) const;
     const Wall wall;
     const double stiffness;
     const std::vector<double> radii;

@@ -7,7 +7,10 @@
 
 namespace cylchain {
 
-/** How a chain would change at one of its ends. */
+/**
+ * How a chain would change at one of its ends. One that begins has one node and no segments before, and one that vanishes
+ * so afterwards.
+ */
 struct EndChange {
     /** The number of the chain. */
     int chain;
@@ -21,6 +24,10 @@ struct EndChange {
     const std::vector<double> &alongBefore, &alongAfter;
     /** Where the new joint is on the segment that is divided, or the old one on that which both become: a fraction. */
     double joint;
+    /** How many nodes at the end are others, before or after. */
+    int countNodes(int segments) const {
+        return segments == 0 ? 0 : segments+(segmentsBefore == 0 || segmentsAfter == 0 ? 1 : 0);
+    }
 };
 
 /** What the ends of chains feel of all that is around them: their walls, or their contacts. */
@@ -36,8 +43,15 @@ public:
     virtual void begin(const double* positions, const ChainList& chains, const double* box) = 0;
     /** Find the change of the energy, infinite if it cannot be. */
     virtual double findChange(const EndChange& change) = 0;
-    /** Take note of a change that was made. */
-    virtual void accept(const EndChange& change) = 0;
+    /**
+     * Take note of the nodes that a chain has now, and of the lengths along it, at rest, at which they are.
+     */
+    virtual void show(int chain, const std::vector<Vec3d>& nodes, const std::vector<double>& along) = 0;
+    /**
+     * Take note that all beyond a length along a chain is on another one now, with the same lengths along it.
+     */
+    virtual void move(int, int, double) {
+    }
 };
 
 } // namespace cylchain

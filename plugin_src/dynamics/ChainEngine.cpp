@@ -291,8 +291,11 @@ ChainEngine::ChainEngine(const vector<Chain>& chains, const vector<PieceOfChain>
             throw invalid_argument("Chain "+to_string(i)+" has a model that there is not");
     implementation.reset(new Implementation(origins.empty() ? chains : vector<Chain>()));
     // Chains of similar length come next to each other, the longest first, so that threads end together.
-    vector<int> order(chains.size());
-    iota(order.begin(), order.end(), 0);
+    // Those that are empty now are in none.
+    vector<int> order;
+    for (size_t i = 0; i < chains.size(); i++)
+        if (!chains[i].nodes.empty())
+            order.push_back(i);
     stable_sort(order.begin(), order.end(), [&] (int a, int b) {
         auto key = [&] (const Chain& chain) {
             return make_tuple(-(int) chain.nodes.size(), chain.bending, chain.stretching, chain.closed, chain.planar,
@@ -339,18 +342,25 @@ bool ChainEngine::replaceChains(const vector<Chain>& chains, const vector<int>& 
     for (int chain : changed)
         isChanged[chain] = 1;
     vector<vector<int> >& members = implementation->members;
+    vector<char> isInPack(chains.size(), 0);
     vector<int> packs;
     for (size_t pack = 0; pack < members.size(); pack++) {
         vector<int>& own = members[pack];
+        for (int chain : own)
+            isInPack[chain] = 1;
         if (none_of(own.begin(), own.end(), [&] (int chain) {return isChanged[chain] != 0;}))
             continue;
         stable_sort(own.begin(), own.end(), [&] (int a, int b) {
             return chains[a].nodes.size() > chains[b].nodes.size();
         });
-        if (!mayShareLanes(chains[own[0]], chains[own.back()], LARGEST_FILLING_OF_GROWN))
+        if (chains[own.back()].nodes.empty() ||
+                !mayShareLanes(chains[own[0]], chains[own.back()], LARGEST_FILLING_OF_GROWN))
             return false;
         packs.push_back(pack);
     }
+    for (int chain : changed)
+        if (!isInPack[chain] && !chains[chain].nodes.empty())
+            return false;
     // Tables of what has changed are its own, and those before are gone with it.
     implementation->tables = PropertyTables<double>();
     implementation->wideTables = PropertyTables<float>();

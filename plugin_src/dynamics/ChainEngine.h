@@ -110,7 +110,8 @@ struct PieceOfChain {
 class ChainEngine {
 public:
     /**
-     * @param chains   the chains; no particle may be a node of two of them. A chain without models is refused.
+     * @param chains   the chains; no particle may be a node of two of them. A chain without models is refused, and one
+     *                 without nodes does nothing.
      */
     explicit ChainEngine(const std::vector<Chain>& chains);
     /**

@@ -71,7 +71,7 @@ void LinkerKinetics::sumLengths() {
     }
 }
 
-bool LinkerKinetics::setChains(const ChainList& chains, LinkerState& state) {
+bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& cuts, LinkerState& state) {
     contours = Contours(chains);
     sumLengths();
     cells.forgetSegments();
@@ -81,11 +81,18 @@ bool LinkerKinetics::setChains(const ChainList& chains, LinkerState& state) {
     bool any = false;
     for (Linker& linker : state.linkers)
         for (int side = 0; side < 2; side++) {
-            const HandPlace before = linker.hands[side];
+            HandPlace& place = linker.hands[side];
+            const HandPlace before = place;
             if (!before.isBound() || contours.isClosed(before.chain))
                 continue;
-            stayOnChain(linker, side, count);
-            any = any || !linker.hands[side].isBound() || linker.hands[side].position != before.position;
+            for (const ChainCut& cut : cuts)
+                if (place.chain == cut.chain && place.position > cut.along)
+                    place.chain = cut.part;
+            if (contours.getLength(place.chain) > 0)
+                stayOnChain(linker, side, count);
+            else
+                unbind(linker, side, nullptr, count);
+            any = any || place.chain != before.chain || !linker.hands[side].isBound() || linker.hands[side].position != before.position;
         }
     for (size_t type = 0; type < system.types.size(); type++)
         state.events[type].unbindings += count.events[type].unbindings;

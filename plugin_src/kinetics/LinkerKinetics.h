@@ -62,11 +62,12 @@ public:
         system.kT = kT;
     }
     /**
-     * Take note that chains have grown or shrunk. Hands beyond an end let go, or stay there.
+     * Take note that chains have grown, shrunk, or were cut. Hands beyond an end let go, or stay there.
      *
-     * @return whether there were any
+     * @param cuts  where chains were cut, one after the other: hands keep their lengths along them
+     * @return whether there were any such hands, or hands on other chains than before
      */
-    bool setChains(const ChainList& chains, LinkerState& state);
+    bool setChains(const ChainList& chains, const std::vector<ChainCut>& cuts, LinkerState& state);
     /**
      * Take a step.
      *

@@ -11,6 +11,13 @@ namespace cylchain {
 /** What the parts of a chain are. */
 enum class ChainKind : int {StraightSegments, BeamElements};
 
+/** A chain that was cut: what was beyond a length along it belongs to another one. */
+struct ChainCut {
+    /** Their numbers among all chains. */
+    int chain, part;
+    double along;
+};
+
 /**
  * The chains of a System in one list, each with its kind and its name.
  *

@@ -26,10 +26,19 @@ int SegmentDivision::getMonomers(int segment) const {
 }
 
 void cylchain::setMonomers(Chain& chain, const MonomerTable& table, MonomerRange range) {
-    const SegmentDivision division(range, table.monomersPerSegment);
-    const int count = division.countSegments();
     vector<int> particles = chain.nodes;
     particles.insert(particles.end(), chain.spareNodes.begin(), chain.spareNodes.end());
+    if (range.size() == 0) {
+        chain.nodes.clear();
+        chain.spareNodes.swap(particles);
+        chain.fixed.clear();
+        chain.segments.clear();
+        chain.joints.clear();
+        chain.start = 0;
+        return;
+    }
+    const SegmentDivision division(range, table.monomersPerSegment);
+    const int count = division.countSegments();
     chain.nodes.assign(particles.begin(), particles.begin()+count+1);
     chain.spareNodes.assign(particles.begin()+count+1, particles.end());
     chain.fixed.resize(count+1, false);

@@ -55,7 +55,7 @@ private:
 
 /**
  * Let a chain have the segments of a range of monomers. Its nodes are the first ones of all its particles, and others
- * are spare. Nodes that come or go are none that are fixed.
+ * are spare: all of them if there are no monomers. Nodes that come or go are none that are fixed.
  */
 void setMonomers(Chain& chain, const MonomerTable& table, MonomerRange range);
 

@@ -16,6 +16,8 @@ void PlaceResponses::begin(const ChainPlaces& newPlaces, double newStepSize) {
     beams.assign(places->getNumFilaments(), Beam());
     for (size_t i = 0; i < chains.size(); i++) {
         const Chain& chain = chains[i];
+        if (chain.segments.empty())
+            continue;
         const Segment& segment = chain.segments[0];
         Beam& beam = beams[i];
         beam.length = places->getLength(i);

@@ -3,30 +3,13 @@
  * free ends, a rod that grows against a wall, a pool that runs dry, and the energies of contacts at ends.
  */
 
-#include "TestChains.h"
+#include "GrowingChains.h"
 #include "couplings/ContactBodies.h"
-#include "growth/ChainGrowth.h"
 #include "couplings/EndContacts.h"
 #include "couplings/EndLinks.h"
 #include "couplings/EndWalls.h"
 #include <map>
 #include <numeric>
-
-static const int PER_SEGMENT = 12;
-static const double MONOMER = 2, KT = 2.5;
-
-/** What is soft enough to show: lengths fluctuate by 4 %, and joints bend by 0.5. */
-static MonomerTable makeTable(bool fene, double softness = 1) {
-    MonomerTable table;
-    table.monomersPerSegment = PER_SEGMENT;
-    for (int m = 1; m <= 2*PER_SEGMENT; m++) {
-        const double length = MONOMER*m;
-        table.segments.push_back({length, 60/softness/length, fene ? 0.3*length : 0, 1, 2, 10, 10});
-    }
-    for (int both = 2; both <= 3*PER_SEGMENT; both++)
-        table.joints.push_back(8*KT*2*PER_SEGMENT/both/softness);
-    return table;
-}
 
 static void testDivision() {
     for (int perSegment : {2, 3, 7, 12})
@@ -49,158 +32,6 @@ static void testDivision() {
             }
 }
 
-static mt19937_64 generatorOf(int seed) {
-    return mt19937_64(seed);
-}
-
-/** A number drawn by a density on a grid. */
-template <class Density> static double drawFrom(Density density, double from, double to, mt19937_64& generator) {
-    const int count = 1000;
-    static thread_local vector<double> sums;
-    sums.assign(1, 0);
-    for (int i = 0; i < count; i++)
-        sums.push_back(sums.back()+density(from+(i+0.5)*(to-from)/count));
-    const double chosen = uniform_real_distribution<double>(0, sums.back())(generator);
-    const int i = upper_bound(sums.begin(), sums.end(), chosen)-sums.begin()-1;
-    return from+(i+(chosen-sums[i])/(sums[i+1]-sums[i]))*(to-from)/count;
-}
-
-static double bendingByHand(BendingModel model, double stiffness, double angle) {
-    const double length = bendByHand(model, min(fabs(angle), M_PI-1e-6)).length;
-    return 0.5*stiffness*length*length;
-}
-
-static double stretchingByHand(const Segment& segment, StretchingModel model, double extension) {
-    const double d = segment.maximumExtension;
-    if (model == StretchingModel::Harmonic)
-        return 0.5*segment.stiffness*extension*extension;
-    return fabs(extension) < d ? -0.5*segment.stiffness*d*d*log(1-extension*extension/d/d) : HUGE_VAL;
-}
-
-/** Weights of the angle of a joint and of the extension of a segment, in equilibrium. */
-struct Weights {
-    BendingModel bending;
-    StretchingModel stretching;
-    bool planar;
-    double ofAngle(double stiffness, double angle) const {
-        return (planar ? 1 : sin(angle))*exp(-bendingByHand(bending, stiffness, angle)/KT);
-    }
-    double ofExtension(const Segment& segment, double extension) const {
-        const double length = segment.restLength+extension;
-        return length > 0 ? pow(length, planar ? 1 : 2)*exp(-stretchingByHand(segment, stretching, extension)/KT) : 0;
-    }
-    double meanBending(double stiffness) const {
-        double sum = 0, norm = 0;
-        for (int i = 0; i < 31415; i++) {
-            const double angle = 1e-4*(i+0.5), weight = ofAngle(stiffness, angle);
-            sum += weight*bendingByHand(bending, stiffness, angle);
-            norm += weight;
-        }
-        return sum/norm;
-    }
-    double meanStretching(const Segment& segment) const {
-        double sum = 0, norm = 0;
-        for (int i = -10000; i < 10000; i++) {
-            const double extension = 1e-4*i*segment.restLength, weight = ofExtension(segment, extension);
-            if (weight > 0) {
-                sum += weight*stretchingByHand(segment, stretching, extension);
-                norm += weight;
-            }
-        }
-        return sum/norm;
-    }
-};
-
-static GrowingEnd endOf(double onRate, double offRate) {
-    GrowingEnd end;
-    end.onRate = onRate;
-    end.offRate = offRate;
-    return end;
-}
-
-/** Chains that grow, where they are and what they have become. */
-struct Growing {
-    ChainList chains;
-    Array x;
-    GrowthSystem system;
-    GrowthState state;
-    vector<BendingModel> bending;
-    vector<StretchingModel> stretching;
-    vector<char> planar;
-    /** Add a chain in equilibrium. */
-    void add(const Weights& weights, MonomerRange range, int particles, const GrowingEnd& minus,
-            const GrowingEnd& plus, mt19937_64& generator, int pool = 0) {
-        const MonomerTable& table = system.tables[0];
-        Chain chain;
-        chain.bending = weights.bending;
-        chain.stretching = weights.stretching;
-        chain.planar = weights.planar;
-        for (int i = 0; i < particles; i++)
-            chain.nodes.push_back(x.size()/3+i);
-        chain.fixed.assign(particles, false);
-        setMonomers(chain, table, range);
-        Vec3d node = {0, 0, 0}, along = {1, 0, 0};
-        auto put = [&] {
-            x.insert(x.end(), {node.x, node.y, node.z});
-        };
-        put();
-        for (size_t s = 0; s < chain.segments.size(); s++) {
-            if (s > 0) {
-                const double stiffness = chain.joints[s-1];
-                const double angle = drawFrom([&] (double a) {return weights.ofAngle(stiffness, fabs(a));},
-                        weights.planar ? -M_PI : 0, M_PI, generator);
-                const double azimuth = uniform_real_distribution<double>(0, 2*M_PI)(generator);
-                const Vec3d first = weights.planar ? Vec3d {-along.y, along.x, 0} :
-                        along.cross(fabs(along.x) < 0.5 ? Vec3d {1, 0, 0} : Vec3d {0, 1, 0});
-                const Vec3d across = first*(1/sqrt(first.squared())), other = along.cross(across);
-                along = along*cos(angle)+(weights.planar ? across : across*cos(azimuth)+other*sin(azimuth))*sin(angle);
-            }
-            const double rest = chain.segments[s].restLength;
-            const double extension = drawFrom([&] (double e) {return weights.ofExtension(chain.segments[s], e);},
-                    -0.6*rest, 0.6*rest, generator);
-            node = node+along*(rest+extension);
-            put();
-        }
-        for (size_t i = 0; i < chain.spareNodes.size(); i++)
-            put();
-        GrowingChain own = {chains.add(chain), 0, pool, 2, {minus, plus}};
-        system.chains.push_back(own);
-        state.ranges.push_back(range);
-        state.events.resize(2*state.ranges.size());
-        state.shrinks.resize(2*state.ranges.size(), 0);
-        bending.push_back(weights.bending);
-        stretching.push_back(weights.stretching);
-        planar.push_back(weights.planar);
-    }
-    ChainGrowth makeGrowth() const {
-        return ChainGrowth(system, bending, stretching, planar);
-    }
-};
-
-struct Mean {
-    double sum = 0, squares = 0;
-    long long count = 0;
-    void add(double value) {
-        sum += value;
-        squares += value*value;
-        count++;
-    }
-    double mean() const {
-        return sum/count;
-    }
-    double variance() const {
-        return squares/count-mean()*mean();
-    }
-    double error() const {
-        return sqrt(variance()/count);
-    }
-};
-
-static void checkMean(double expected, const Mean& found, double power, const string& what) {
-    check(found.error() < power*fabs(expected)/4, what+": too few samples");
-    checkClose(expected, found.mean(), 4*found.error(), 1, what);
-}
-
 /** Rates, and energies of lengths and bends, of chains that have grown and shrunk, at a step of so many events. */
 static void checkFreeEnds(const Weights& weights, double events) {
     const int number = 1800;
@@ -208,16 +39,14 @@ static void checkFreeEnds(const Weights& weights, double events) {
     Growing all;
     all.system.tables = {makeTable(hasRange(weights.stretching))};
     all.system.pools = {{0.02, 0}};
-    all.state.free = {0};
     // The plus end gains 3 and loses 2 per time, and the minus end 1 and 2.5.
     for (int i = 0; i < number; i++)
         all.add(weights, {-20-i%PER_SEGMENT, 24+i%7}, 14, endOf(50, 2.5), endOf(150, 2), generator);
     ChainGrowth growth = all.makeGrowth();
     const double time = 8, stepSize = events/8.5;
     const int steps = max(1.0, round(time/stepSize));
-    vector<int> changed;
     for (int i = 0; i < steps; i++)
-        check(growth.advance(all.state, {KT, time/steps, 7}, all.chains, all.x.data(), {}, changed) == -1, "a step");
+        all.advance(growth, time/steps, 7);
     Mean plus, minus, plusSquare, bends, lengths;
     map<double, double> meanBending, meanStretching;
     auto remember = [] (map<double, double>& known, double key, auto find) {
@@ -281,7 +110,6 @@ static void checkRodBeforeWall(double events) {
     // They have two segments from 18 monomers on, for which there are no nodes.
     EndWalls wall({WallShape::Plane, {distance, 0, 0}, {-1, 0, 0}, 0}, stiffness, Array(300, 0.0));
     ChainGrowth growth = all.makeGrowth();
-    vector<int> changed;
     vector<double> counts(18), exact(18);
     const int blocks = 20;
     vector<Array> ofBlocks(blocks, Array(18));
@@ -290,7 +118,7 @@ static void checkRodBeforeWall(double events) {
     for (int block = -2; block < blocks; block++)
         for (int sample = 0; sample < 25; sample++) {
             for (int i = 0; i < steps; i++)
-                growth.advance(all.state, {KT, 4.0/steps, 9}, all.chains, all.x.data(), {&wall}, changed);
+                all.advance(growth, 4.0/steps, 9, {&wall});
             for (const MonomerRange& range : all.state.ranges)
                 if (block >= 0)
                     ofBlocks[block][range.size()] += 1;
@@ -342,8 +170,7 @@ static void testPool() {
     mt19937_64 generator = generatorOf(4);
     Growing all;
     all.system.tables = {makeTable(false)};
-    all.system.pools = {{0, 1000}};
-    all.state.free = {30};
+    all.system.pools = {{0.03, 1000}};
     const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
     const int least = 2, monomers = 30+2*10;
     for (int i = 0; i < 2; i++)
@@ -363,11 +190,10 @@ static void testPool() {
             second += b*weight;
         }
     Mean ofFirst, ofSecond;
-    vector<int> changed;
     for (int block = 0; block < 40; block++) {
         Mean one, other;
         for (int i = 0; i < 2500; i++) {
-            growth.advance(all.state, {KT, 5, 3}, all.chains, all.x.data(), {}, changed);
+            all.advance(growth, 5, 3);
             one.add(all.state.ranges[0].size());
             other.add(all.state.ranges[1].size());
             check(all.state.ranges[0].size()+all.state.ranges[1].size()+all.state.free[0] == monomers, "all monomers");
@@ -388,10 +214,8 @@ static void testDynamicInstability() {
         all.system.pools = {{1, 0}};
         const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
         // Monomers come at 3 per time or go at 6, and ends turn at 0.5 and 0.2.
-        GrowingEnd plus = endOf(3, 0);
-        plus.shrinking.offRate = 6;
-        plus.catastropheRate = 0.5;
-        plus.rescueRate = 0.2;
+        GrowingEnd plus;
+        plus.states = {{3, 0, 0, 0, {0, 0.5}}, {0, 6, 1, 1, {0.2, 0}}};
         for (int i = 0; i < 400; i++)
             all.add(weights, {0, 12}, 20, endOf(0, 0), plus, generator);
         ChainGrowth growth = all.makeGrowth();
@@ -409,11 +233,10 @@ static void testDynamicInstability() {
         }
         mean /= norm;
         Mean found;
-        vector<int> changed;
         for (int block = -4; block < 16; block++) {
             Mean lengths;
             for (int i = 0; i < 20/stepSize; i++) {
-                growth.advance(all.state, {KT, stepSize, 3}, all.chains, all.x.data(), {}, changed);
+                all.advance(growth, stepSize, 3);
                 if (i%max(1, static_cast<int>(1/stepSize)) == 0)
                     for (const MonomerRange& range : all.state.ranges)
                         lengths.add(range.size());
@@ -436,9 +259,8 @@ static void testOrder() {
         for (int i = 0; i < number; i++)
             all.add(weights, {0, 30}, 14, endOf(50, 1), endOf(150, 2), generator);
         ChainGrowth growth = all.makeGrowth();
-        vector<int> changed;
         for (int i = 0; i < 20; i++)
-            growth.advance(all.state, {KT, 0.3, 3}, all.chains, all.x.data(), {}, changed);
+            all.advance(growth, 0.3, 3);
         return Array(all.x.begin(), all.x.begin()+42);
     };
     check(grown(1) == grown(5), "a chain by itself and among others");
@@ -541,7 +363,7 @@ static void testContacts() {
         const double difference = energyOfContacts(bodies, x, 5)-energy;
         touching += difference != 0;
         checkClose(difference, found, 1+fabs(energy), 1e-9, "the contacts of an end");
-        contacts.accept(change);
+        contacts.show(chain, after, {});
         const EndChange back = {chain, end, after, nodes[chain], kind == 1 ? 2 : 1, kind == 2 ? 2 : 1,
                 {}, {}, 0.6};
         checkClose(-difference, contacts.findChange(back), 1+fabs(energy), 1e-9,
@@ -647,7 +469,7 @@ static void testLinks() {
             const EndChange change = {chain, end, now[chain], after, segments[0], segments[1], lengths[chain],
                     alongAfter, 0.7};
             const double found = felt.findChange(change), before = energy();
-            felt.accept(change);
+            felt.show(chain, after, alongAfter);
             now[chain] = after;
             lengths[chain] = alongAfter;
             moved += found != 0;
@@ -674,10 +496,9 @@ static void testRodInTheWay() {
     bodies.chains = {{{0, 1}, 2, 1, false}, {{2, 3}, 2, 1, false}};
     EndContacts contacts(bodies, {0, -1}, 1000, false);
     ChainGrowth growth = all.makeGrowth();
-    vector<int> changed;
     double farthest = 0;
     for (int i = 0; i < 20000; i++) {
-        growth.advance(all.state, {KT, 1, 3}, all.chains, all.x.data(), {&contacts}, changed);
+        all.advance(growth, 1, 3, {&contacts});
         farthest = max(farthest, all.x[3]);
     }
     check(farthest > 26 && farthest < 29.7, "a rod in the way");

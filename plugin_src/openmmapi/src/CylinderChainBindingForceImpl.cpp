@@ -225,10 +225,11 @@ void CylinderChainBindingForceImpl::setState(const cylchain::LinkerState& replac
     accept();
 }
 
-void CylinderChainBindingForceImpl::chainsHaveGrown(ContextImpl&, const cylchain::ChainList& chains) {
+void CylinderChainBindingForceImpl::chainsHaveGrown(ContextImpl&, const cylchain::ChainList& chains,
+        const vector<cylchain::ChainCut>& cuts) {
     contours.reset(new cylchain::Contours(chains));
     upToDate = false;
-    if (linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().setChains(chains, state))
+    if (linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().setChains(chains, cuts, state))
         accept();
 }
 

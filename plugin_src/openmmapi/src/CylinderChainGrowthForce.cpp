@@ -2,6 +2,7 @@
 #include "openmm/OpenMMException.h"
 #include "openmm/internal/AssertionUtilities.h"
 #include "openmm/internal/CylinderChainGrowthForceImpl.h"
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -89,79 +90,179 @@ void CylinderChainGrowthForce::getPoolParameters(int pool, double& concentration
 }
 
 int CylinderChainGrowthForce::addGrowingChain(int chain, int table, int pool, int firstMonomer, int lastMonomer,
-        int leastMonomers, double minusOnRate, double minusOffRate, double plusOnRate, double plusOffRate) {
+        int leastMonomers, bool vanishes) {
     requireOfGrowth(table >= 0 && table < getNumTables(), "There is no table "+to_string(table));
     requireOfGrowth(pool >= 0 && pool < getNumPools(), "There is no pool "+to_string(pool));
     requireOfGrowth(chain >= 0, "There is no chain "+to_string(chain));
     for (const GrowingChain& other : system.chains)
         requireOfGrowth(other.chain != chain, "Chain "+to_string(chain)+" grows already");
-    requireOfGrowth(firstMonomer > -MOST_MONOMERS && lastMonomer < MOST_MONOMERS && firstMonomer < lastMonomer,
-            "The numbers of monomers must increase along chain "+to_string(chain));
-    requireOfGrowth(leastMonomers >= 2 && lastMonomer-firstMonomer >= leastMonomers, "Chain "+to_string(chain)+
-            " has fewer monomers than it can have, or can have less than two");
-    for (double rate : {minusOnRate, minusOffRate, plusOnRate, plusOffRate})
-        requireOfGrowth(isRate(rate), "The rates of chain "+to_string(chain)+" cannot be negative and must be finite");
-    GrowingChain own = {chain, table, pool, leastMonomers, {}};
-    own.ends[0].onRate = minusOnRate;
-    own.ends[0].offRate = minusOffRate;
-    own.ends[1].onRate = plusOnRate;
-    own.ends[1].offRate = plusOffRate;
+    const bool isEmpty = firstMonomer == 0 && lastMonomer == 0;
+    requireOfGrowth(firstMonomer > -MOST_MONOMERS && lastMonomer < MOST_MONOMERS &&
+            (isEmpty || firstMonomer < lastMonomer), "The numbers of monomers must increase along chain "+
+            to_string(chain));
+    requireOfGrowth(leastMonomers >= 2 && (isEmpty || lastMonomer-firstMonomer >= leastMonomers), "Chain "+
+            to_string(chain)+" has fewer monomers than it can have, or can have less than two");
+    GrowingChain own;
+    own.chain = chain;
+    own.table = table;
+    own.pool = pool;
+    own.leastMonomers = leastMonomers;
+    own.vanishes = vanishes;
     system.chains.push_back(own);
     ranges.push_back({firstMonomer, lastMonomer});
     return system.chains.size()-1;
 }
 
 void CylinderChainGrowthForce::getGrowingChainParameters(int index, int& chain, int& table, int& pool,
-        int& firstMonomer, int& lastMonomer, int& leastMonomers, double& minusOnRate, double& minusOffRate,
-        double& plusOnRate, double& plusOffRate) const {
-    ASSERT_VALID_INDEX(index, system.chains);
-    const GrowingChain& own = system.chains[index];
+        int& firstMonomer, int& lastMonomer, int& leastMonomers, bool& vanishes) const {
+    const GrowingChain& own = getOwn(index);
     chain = own.chain;
     table = own.table;
     pool = own.pool;
     firstMonomer = ranges[index].first;
     lastMonomer = ranges[index].last;
     leastMonomers = own.leastMonomers;
-    minusOnRate = own.ends[0].onRate;
-    minusOffRate = own.ends[0].offRate;
-    plusOnRate = own.ends[1].onRate;
-    plusOffRate = own.ends[1].offRate;
+    vanishes = own.vanishes;
 }
 
-void CylinderChainGrowthForce::setDynamicInstability(int index, int end, double shrinkingOnRate,
-        double shrinkingOffRate, double catastropheRate, double rescueRate) {
+GrowingChain& CylinderChainGrowthForce::getOwn(int index) {
     ASSERT_VALID_INDEX(index, system.chains);
-    requireOfGrowth(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
-    for (double rate : {shrinkingOnRate, shrinkingOffRate, catastropheRate, rescueRate})
-        requireOfGrowth(isRate(rate),
-                "The rates of chain "+to_string(system.chains[index].chain)+
-                        " cannot be negative and "
-                        "must be finite");
-    GrowingEnd& own = system.chains[index].ends[end];
-    own.shrinking = {shrinkingOnRate, shrinkingOffRate};
-    own.catastropheRate = catastropheRate;
-    own.rescueRate = rescueRate;
+    return system.chains[index];
 }
 
-void CylinderChainGrowthForce::getDynamicInstability(int index, int end, double& shrinkingOnRate,
-        double& shrinkingOffRate, double& catastropheRate, double& rescueRate) const {
+const GrowingChain& CylinderChainGrowthForce::getOwn(int index) const {
     ASSERT_VALID_INDEX(index, system.chains);
-    requireOfGrowth(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
-    const GrowingEnd& own = system.chains[index].ends[end];
-    shrinkingOnRate = own.shrinking.onRate;
-    shrinkingOffRate = own.shrinking.offRate;
-    catastropheRate = own.catastropheRate;
-    rescueRate = own.rescueRate;
+    return system.chains[index];
 }
 
-GrowthState CylinderChainGrowthForce::getState() const {
-    GrowthState state;
-    state.ranges = ranges;
-    state.events.resize(2*ranges.size());
-    state.shrinks.assign(2*ranges.size(), 0);
-    for (const MonomerPool& pool : system.pools)
-        state.free.push_back(llround(pool.concentration*pool.volume));
-    return state;
+void CylinderChainGrowthForce::setEndStates(int index, int end, int initialState, const vector<double>& parameters,
+        const vector<int>& numbers, const vector<double>& loads) {
+    GrowingChain& chain = getOwn(index);
+    const size_t count = parameters.size()/2;
+    requireOfGrowth(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
+    requireOfGrowth(count >= 1 && parameters.size() == 2*count && numbers.size() == 2*count &&
+            loads.size() == count*count, "There must be two rates and two numbers for each state of an end, and a rate "
+            "from each to each");
+    auto isState = [&] (int state) {
+        return state >= 0 && state < static_cast<int>(count);
+    };
+    requireOfGrowth(isState(initialState) && all_of(numbers.begin(), numbers.end(), isState),
+            "An end of chain "+to_string(chain.chain)+" has no such state");
+    for (const vector<double>* rates : {&parameters, &loads})
+        requireOfGrowth(all_of(rates->begin(), rates->end(), isRate), "The rates of chain "+to_string(chain.chain)+
+                " cannot be negative and must be finite");
+    GrowingEnd own;
+    own.states.clear();
+    own.initialState = initialState;
+    for (size_t i = 0; i < count; i++) {
+        vector<double> rates(loads.begin()+i*count, loads.begin()+(i+1)*count);
+        requireOfGrowth(rates[i] == 0, "No state can change to itself");
+        own.states.push_back({parameters[2*i], parameters[2*i+1], numbers[2*i], numbers[2*i+1], rates});
+    }
+    chain.ends[end] = own;
+}
+
+void CylinderChainGrowthForce::getEndStates(int index, int end, int& initialState, vector<double>& parameters,
+        vector<int>& numbers, vector<double>& loads) const {
+    requireOfGrowth(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
+    const GrowingEnd& own = getOwn(index).ends[end];
+    initialState = own.initialState;
+    parameters.clear();
+    numbers.clear();
+    loads.clear();
+    for (const EndState& state : own.states) {
+        parameters.insert(parameters.end(), {state.onRate, state.offRate});
+        numbers.insert(numbers.end(), {state.afterGain, state.afterLoss});
+        loads.insert(loads.end(), state.switchRates.begin(), state.switchRates.end());
+        loads.resize(numbers.size()/2*own.states.size(), 0);
+    }
+}
+
+void CylinderChainGrowthForce::setMonomersHaveStates(int index, bool monomersHaveStates) {
+    getOwn(index).monomersHaveStates = monomersHaveStates;
+}
+
+bool CylinderChainGrowthForce::getMonomersHaveStates(int index) const {
+    return getOwn(index).monomersHaveStates;
+}
+
+void CylinderChainGrowthForce::setSevering(int index, double rate, int minusState, int plusState,
+        const vector<double>& parameters) {
+    GrowingChain& own = getOwn(index);
+    requireOfGrowth(isRate(rate), "The rate of cutting chain "+to_string(own.chain)+" cannot be negative and must be "
+            "finite");
+    requireOfGrowth(all_of(parameters.begin(), parameters.end(), [] (double share) {return share >= 0 && share <= 1;}),
+            "Shares are between 0 and 1");
+    own.severing = {rate, parameters, minusState, plusState};
+}
+
+void CylinderChainGrowthForce::getSevering(int index, double& rate, int& minusState, int& plusState,
+        vector<double>& parameters) const {
+    const ChainSevering& own = getOwn(index).severing;
+    rate = own.rate;
+    minusState = own.minusState;
+    plusState = own.plusState;
+    parameters = own.shares;
+}
+
+int CylinderChainGrowthForce::addNucleator(double rate, int order, int monomers, int region,
+        const vector<double>& parameters, const Vec3& direction, const vector<int>& numbers) {
+    requireOfGrowth(isRate(rate), "The rate of a nucleator cannot be negative and must be finite");
+    requireOfGrowth(order >= 0 && order <= 100, "The order of a nucleator must be from 0 to 100");
+    requireOfGrowth(region >= 0 && region <= 2, "There is no region "+to_string(region));
+    const size_t sizes[] = {0, 6, 4};
+    requireOfGrowth(parameters.size() == sizes[region], "A region needs "+to_string(sizes[region])+" numbers, but has "+
+            to_string(parameters.size()));
+    requireOfGrowth(all_of(parameters.begin(), parameters.end(), [] (double x) {return isfinite(x);}),
+            "A region must be finite");
+    Nucleator own;
+    own.rate = rate;
+    own.order = order;
+    own.monomers = monomers;
+    own.region = static_cast<NucleationRegion>(region);
+    const double* p = parameters.data();
+    if (region == 1) {
+        own.lower = {p[0], p[1], p[2]};
+        own.upper = {p[3], p[4], p[5]};
+    }
+    if (region == 2) {
+        own.centre = {p[0], p[1], p[2]};
+        own.radius = p[3];
+        requireOfGrowth(own.radius >= 0, "The radius of a sphere cannot be negative");
+    }
+    const double length = sqrt(direction.dot(direction));
+    requireOfGrowth(isfinite(length), "A direction must be finite");
+    if (length > 0)
+        own.direction = {direction[0]/length, direction[1]/length, direction[2]/length};
+    for (int index : numbers) {
+        const GrowingChain& chain = getOwn(index);
+        const GrowingChain& first = getOwn(numbers[0]);
+        requireOfGrowth(monomers >= chain.leastMonomers, "Chain "+to_string(chain.chain)+" cannot begin with "+
+                to_string(monomers)+" monomers");
+        requireOfGrowth(chain.table == first.table && chain.pool == first.pool,
+                "The chains of a nucleator must be made of the same, and have one pool");
+    }
+    own.chains = numbers;
+    system.nucleators.push_back(own);
+    return system.nucleators.size()-1;
+}
+
+void CylinderChainGrowthForce::getNucleatorParameters(int index, double& rate, int& order, int& monomers, int& region,
+        vector<double>& parameters, Vec3& direction, vector<int>& numbers) const {
+    ASSERT_VALID_INDEX(index, system.nucleators);
+    const Nucleator& own = system.nucleators[index];
+    rate = own.rate;
+    order = own.order;
+    monomers = own.monomers;
+    region = static_cast<int>(own.region);
+    parameters.clear();
+    if (own.region == NucleationRegion::Cuboid)
+        for (const Vec3d& corner : {own.lower, own.upper})
+            parameters.insert(parameters.end(), {corner.x, corner.y, corner.z});
+    if (own.region == NucleationRegion::Sphere)
+        parameters = {own.centre.x, own.centre.y, own.centre.z, own.radius};
+    direction = Vec3(own.direction.x, own.direction.y, own.direction.z);
+    numbers = own.chains;
 }
 
 void CylinderChainGrowthForce::setMonomers(ChainList& chains, set<int>& growing) const {
@@ -173,7 +274,10 @@ void CylinderChainGrowthForce::setMonomers(ChainList& chains, set<int>& growing)
         Chain& chain = chains.getChain(own.chain);
         requireOfGrowth(
                 isAngular(chain.bending) && chain.nodeFriction == 0, name+" cannot grow: it is a chain of beads");
-        requireOfGrowth(chain.tethers.empty(), name+" cannot grow: one of its nodes has a tether");
+        for (const Tether& tether : chain.tethers)
+            requireOfGrowth(tether.node == 0 && !own.ends[0].grows(), name+" cannot grow: node "+
+                    to_string(tether.node)+" has a tether. The first one may have some, of a minus end that does not "
+                    "grow");
         const MonomerTable& table = system.tables[own.table];
         if (hasRange(chain.stretching))
             for (const Segment& segment : table.segments)
@@ -184,7 +288,22 @@ void CylinderChainGrowthForce::setMonomers(ChainList& chains, set<int>& growing)
                     node < (size_t) SegmentDivision(ranges[i], table.monomersPerSegment).countSegments()),
                     name+" cannot grow: particle "+to_string(chain.nodes[node])+" has no mass. Nodes may be fixed "
                     "beside a minus end that does not grow");
-        const int segments = SegmentDivision(ranges[i], table.monomersPerSegment).countSegments();
+        const bool isAnyFixed = any_of(chain.fixed.begin(), chain.fixed.end(), [] (bool fixed) {return fixed;});
+        requireOfGrowth(!isAnyFixed || (ranges[i].size() > 0 && !own.vanishes),
+                name+" has nodes without mass, so it cannot begin or vanish");
+        for (const Nucleator& nucleator : system.nucleators)
+            if (find(nucleator.chains.begin(), nucleator.chains.end(), static_cast<int>(i)) != nucleator.chains.end())
+                requireOfGrowth(SegmentDivision({0, nucleator.monomers}, table.monomersPerSegment).countSegments() <
+                        chain.numNodes(), name+" cannot begin with "+to_string(nucleator.monomers)+" monomers: it has "+
+                        to_string(chain.numNodes())+" particles");
+        for (int state : {own.severing.minusState, own.severing.plusState})
+            requireOfGrowth(state >= 0 && state < static_cast<int>(min(own.ends[0].states.size(),
+                    own.ends[1].states.size())), name+" has no end state "+to_string(state));
+        requireOfGrowth(!own.monomersHaveStates || (own.ends[0].states.size() == own.ends[1].states.size() &&
+                (own.severing.shares.empty() || own.severing.shares.size() == own.ends[1].states.size())),
+                name+" needs as many states of its minus end, and shares of its severing, as of its plus end");
+        const int segments = ranges[i].size() == 0 ? 0 :
+                SegmentDivision(ranges[i], table.monomersPerSegment).countSegments();
         requireOfGrowth(segments < chain.numNodes(),
                 name+" needs "+to_string(segments+1)+" nodes for its monomers, but has "+
                         to_string(chain.numNodes())+" particles");
@@ -195,21 +314,30 @@ void CylinderChainGrowthForce::setMonomers(ChainList& chains, set<int>& growing)
 
 void CylinderChainGrowthForce::getGrowthInContext(Context& context, vector<int>& ends, vector<int>& numbers,
         vector<double>& parameters, vector<double>& loads) const {
-    const CylinderChainGrowthForceImpl& impl =
-            dynamic_cast<const CylinderChainGrowthForceImpl&>(getImplInContext(context));
-    const GrowthState& state = impl.getState();
+    const GrowthState& state = dynamic_cast<const CylinderChainGrowthForceImpl&>(getImplInContext(context)).getState();
     ends.clear();
     parameters.clear();
     loads.clear();
-    numbers.assign(state.shrinks.begin(), state.shrinks.end());
+    numbers = state.endStates;
     for (const MonomerRange& range : state.ranges)
         ends.insert(ends.end(), {range.first, range.last});
-    for (const EndEvents& own : state.events)
-        parameters.insert(parameters.end(), {(double) own.gained, (double) own.lost, (double) own.waited,
-                (double) own.catastrophes, (double) own.rescues});
+    for (const EndEvents& own : state.events) {
+        parameters.insert(parameters.end(), {(double) own.gained, (double) own.lost, (double) own.waited});
+        parameters.insert(parameters.end(), own.switches.begin(), own.switches.end());
+    }
     for (size_t i = 0; i < system.pools.size(); i++)
         loads.push_back(system.pools[i].isClosed() ? state.free[i]/system.pools[i].volume :
                 system.pools[i].concentration);
+}
+
+void CylinderChainGrowthForce::getPopulationInContext(Context& context, vector<double>& parameters,
+        vector<double>& sums) const {
+    const GrowthState& state = dynamic_cast<const CylinderChainGrowthForceImpl&>(getImplInContext(context)).getState();
+    parameters.clear();
+    for (size_t i = 0; i < state.ranges.size(); i++)
+        parameters.insert(parameters.end(), {(double) state.identities[i], (double) state.parents[i]});
+    const PopulationEvents& own = state.population;
+    sums = {(double) own.nucleated, (double) own.vanished, (double) own.severed, (double) own.waited};
 }
 
 void CylinderChainGrowthForce::setGrowthInContext(Context& context, const vector<int>& ends) const {

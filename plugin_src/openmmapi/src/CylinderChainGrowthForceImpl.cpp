@@ -30,8 +30,9 @@ static double digestOf(const GrowthState& state) {
         digest.mix((uint32_t) range.first);
         digest.mix((uint32_t) range.last);
     }
-    for (char shrinks : state.shrinks)
-        digest.mix(shrinks != 0 ? 1 : 0);
+    for (int own : state.endStates)
+        digest.mix(own);
+    digest.mix(state.nextIdentity);
     return digest.get();
 }
 
@@ -141,13 +142,20 @@ void CylinderChainGrowthForceImpl::refusePlaces() {
         const long long version = other.first->getVersion();
         if (version == other.second)
             continue;
-        vector<bool> grows(context->getSystem().getNumParticles(), false);
-        for (int chain : growing)
-            for (int particle : chains->getOwner().getChainParticles(chain))
-                grows[particle] = true;
+        // A first node stays where it is if its end does not grow.
+
+        vector<bool> comesAndGoes(context->getSystem().getNumParticles(), false);
+        for (size_t i = 0; i < growing.size(); i++) {
+            const GrowingChain& own = owner.getSystem().chains[i];
+            const vector<int>& particles = chains->getOwner().getChainParticles(growing[i]);
+            for (int particle : particles)
+                comesAndGoes[particle] = true;
+            const bool mayBegin = owner.getState().ranges[i].size() == 0;
+            comesAndGoes[particles[0]] = own.ends[0].grows() || own.vanishes || mayBegin;
+        }
         for (const Place& place : other.first->findPlaces(*places))
-            for (int particle : {place.first, place.second})
-                requireOfGrowing(particle < 0 || !grows[particle],
+            for (int particle : {place.fraction == 1 ? -1 : place.first, place.fraction == 0 ? -1 : place.second})
+                requireOfGrowing(particle < 0 || !comesAndGoes[particle],
                         other.first->getOwner().getName()+" acts on particle "+to_string(particle)+
                                 " of a chain that grows, which is not possible yet: walls, contacts "
                                 "and linkers of this plugin alone are");
@@ -169,30 +177,31 @@ void CylinderChainGrowthForceImpl::updateContextState(ContextImpl& context, bool
     for (const Felt& own : around)
         felt.push_back(own.surroundings.get());
     ChainList& list = chains->getGrowingList();
-    vector<int> numNodes, changed;
+    vector<int> numNodes;
     numNodes.reserve(growing.size());
     for (int chain : growing)
         numNodes.push_back(list.getNumNodes(chain));
-    int failed = -1;
+    GrowthChanges changes;
     try {
-        failed = kernel.getAs<UpdateCylinderChainGrowthKernel>().execute(context, state, step,
-                chains->getDescription().usesPeriodicBoundaryConditions(), list, felt, changed);
+        changes = kernel.getAs<UpdateCylinderChainGrowthKernel>().execute(context, state, step,
+                chains->getDescription().usesPeriodicBoundaryConditions(), list, felt);
     }
     catch (const invalid_argument& error) {
         throw OpenMMException(string("CylinderChainContactForce: ")+error.what());
     }
     accept();
-    requireOfGrowing(failed == -1, "Chains gain and lose more than a million monomers within a step, among them chain "+
-            to_string(failed == -1 ? -1 : growing[failed])+": use a smaller step, or look at the rates");
-    if (changed.empty())
+    requireOfGrowing(changes.failed == -1, "More than a million monomers or chains come and go within a step, among "
+            "them those of chain "+to_string(changes.failed == -1 ? -1 : growing[changes.failed])+": use a smaller "
+            "step, or look at the rates");
+    if (changes.chains.empty())
         return;
-    vector<int> numbers(changed);
+    vector<int> numbers(changes.chains);
     for (int& number : numbers)
         number = growing[number];
     chains->haveGrown(context, numbers);
     for (CouplingForceImpl* coupling : couplings)
-        coupling->chainsHaveGrown(context, list);
-    const bool otherNodes = any_of(changed.begin(), changed.end(), [&] (int i) {
+        coupling->chainsHaveGrown(context, list, changes.cuts);
+    const bool otherNodes = any_of(changes.chains.begin(), changes.chains.end(), [&] (int i) {
         return list.getNumNodes(growing[i]) != numNodes[i];
     });
     if (otherNodes)
@@ -232,20 +241,34 @@ void CylinderChainGrowthForceImpl::refuseForces(const vector<Vec3>& forces) cons
 
 void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
     const GrowthSystem& system = owner.getSystem();
-    requireOfGrowing(replaced.ranges.size() == growing.size() && replaced.events.size() == 2*growing.size() &&
-                    replaced.shrinks.size() == 2*growing.size() && replaced.free.size() == system.pools.size(),
-            "A State or checkpoint has the growth of another number of "
+    const size_t count = growing.size();
+    requireOfGrowing(replaced.ranges.size() == count && replaced.events.size() == 2*count &&
+            replaced.endStates.size() == 2*count && replaced.monomers.size() == count &&
+            replaced.identities.size() == count && replaced.parents.size() == count &&
+            replaced.free.size() == system.pools.size(), "A State or checkpoint has the growth of another number of "
             "chains or pools");
     ChainList& list = chains->getGrowingList();
-    for (size_t i = 0; i < growing.size(); i++) {
+    for (size_t i = 0; i < count; i++) {
         const MonomerRange& range = replaced.ranges[i];
+        const GrowingChain& own = system.chains[i];
         const Chain& chain = list.getChain(growing[i]);
         const int most = chain.nodes.size()+chain.spareNodes.size();
-        requireOfGrowing(range.first < range.last && range.size() >= system.chains[i].leastMonomers &&
-                SegmentDivision(range, system.tables[system.chains[i].table].monomersPerSegment).countSegments() <
-                most, "Chain "+to_string(growing[i])+" cannot have monomers "+to_string(range.first)+" to "+
-                to_string(range.last)+": it has "+to_string(most)+" particles, and needs "+
-                to_string(system.chains[i].leastMonomers)+" monomers");
+        const bool isNone = range.first == 0 && range.last == 0 && (own.vanishes || state.ranges[i].size() == 0);
+        requireOfGrowing(isNone || (range.first < range.last && range.size() >= own.leastMonomers &&
+                SegmentDivision(range, system.tables[own.table].monomersPerSegment).countSegments() < most), "Chain "+
+                to_string(growing[i])+" cannot have monomers "+to_string(range.first)+" to "+to_string(range.last)+
+                ": it has "+to_string(most)+" particles, and needs "+to_string(own.leastMonomers)+" monomers");
+        for (int end : {0, 1}) {
+            const int number = replaced.endStates[2*i+end], states = own.ends[end].states.size();
+            requireOfGrowing(number >= 0 && number < states &&
+                    replaced.events[2*i+end].switches.size() == own.ends[end].states.size(), "An end of chain "+
+                    to_string(growing[i])+" has no such state");
+            for (const MonomerState& monomer : replaced.monomers[i])
+                requireOfGrowing(monomer.state >= 0 && monomer.state < states, "A monomer of chain "+
+                        to_string(growing[i])+" has no such state");
+        }
+        requireOfGrowing(replaced.monomers[i].size() == (own.monomersHaveStates ? (size_t) range.size() : 0), "Chain "+
+                to_string(growing[i])+" has another number of monomers than states of these");
     }
     state = replaced;
     for (size_t i = 0; i < growing.size(); i++)
@@ -253,19 +276,32 @@ void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
     chains->haveGrown(*context, growing);
     setSpareNodes();
     for (CouplingForceImpl* coupling : couplings)
-        coupling->chainsHaveGrown(*context, list);
+        coupling->chainsHaveGrown(*context, list, {});
     accept();
 }
 
 void CylinderChainGrowthForceImpl::setEnds(const vector<int>& ends) {
     requireOfGrowing(ends.size() == 2*growing.size(), "There must be two numbers for each chain that grows");
+    const GrowthSystem& system = owner.getSystem();
     GrowthState replaced = state;
     for (size_t i = 0; i < growing.size(); i++) {
-        replaced.ranges[i] = {ends[2*i], ends[2*i+1]};
-        replaced.free[owner.getSystem().chains[i].pool] -= replaced.ranges[i].size()-state.ranges[i].size();
+        const MonomerRange range = {ends[2*i], ends[2*i+1]};
+        const GrowingChain& own = system.chains[i];
+        replaced.ranges[i] = range;
+        replaced.free[own.pool] -= range.size()-state.ranges[i].size();
+        if (range.first == state.ranges[i].first && range.last == state.ranges[i].last)
+            continue;
+        if (own.monomersHaveStates && range.size() >= 0)
+            replaced.monomers[i].assign(range.size(), {state.time, own.ends[1].initialState});
+        for (int end : {0, 1})
+            replaced.endStates[2*i+end] = own.ends[end].initialState;
+        if (range.size() == 0 || state.ranges[i].size() == 0) {
+            replaced.identities[i] = range.size() == 0 ? -1 : replaced.nextIdentity++;
+            replaced.parents[i] = -1;
+        }
     }
     for (size_t pool = 0; pool < replaced.free.size(); pool++)
-        requireOfGrowing(!owner.getSystem().pools[pool].isClosed() || replaced.free[pool] >= 0, "Pool "+to_string(pool)+
+        requireOfGrowing(!system.pools[pool].isClosed() || replaced.free[pool] >= 0, "Pool "+to_string(pool)+
                 " has not so many monomers");
     setState(replaced);
 }
@@ -273,34 +309,76 @@ void CylinderChainGrowthForceImpl::setEnds(const vector<int>& ends) {
 StateColumns CylinderChainGrowthForceImpl::storeState(bool inCheckpoint) {
     const GrowthState& now = getState();
     StateColumns columns;
-    vector<int> ends;
-    vector<long long> events;
+    vector<int> ends, states;
+    vector<long long> events, switches;
+    vector<double> times;
     for (const MonomerRange& range : now.ranges)
         ends.insert(ends.end(), {range.first, range.last});
-    for (const EndEvents& own : now.events)
-        events.insert(events.end(), {own.gained, own.lost, own.waited, own.catastrophes, own.rescues});
+    for (const EndEvents& own : now.events) {
+        events.insert(events.end(), {own.gained, own.lost, own.waited});
+        switches.insert(switches.end(), own.switches.begin(), own.switches.end());
+    }
+    for (const deque<MonomerState>& monomers : now.monomers)
+        for (const MonomerState& monomer : monomers) {
+            times.push_back(monomer.time);
+            states.push_back(monomer.state);
+        }
+    const PopulationEvents& all = now.population;
     columns.put("ends", ends);
     columns.put("events", events);
-    columns.put("shrinks", vector<int>(now.shrinks.begin(), now.shrinks.end()));
+    columns.put("switches", switches);
+    columns.put("endStates", now.endStates);
+    columns.put("monomerTimes", times);
+    columns.put("monomerStates", states);
     columns.put("free", now.free);
+    columns.put("identities", now.identities);
+    columns.put("parents", now.parents);
+    columns.put("population", vector<long long> {now.nextIdentity, all.nucleated, all.vanished, all.severed,
+            all.waited});
     columns.put("steps", now.steps);
+    columns.put("time", now.time);
     if (inCheckpoint)
         columns.put("seed", seed);
     return columns;
 }
 
 void CylinderChainGrowthForceImpl::restoreState(const StateColumns& columns) {
-    const vector<int> ends = columns.get<int>("ends");
-    const vector<long long> events = columns.get<long long>("events");
-    GrowthState replaced;
+    const GrowthSystem& system = owner.getSystem();
+    const vector<int> ends = columns.get<int>("ends"), states = columns.get<int>("monomerStates");
+    const vector<long long> events = columns.get<long long>("events"), switches = columns.get<long long>("switches"),
+            population = columns.get<long long>("population");
+    const vector<double> times = columns.get<double>("monomerTimes");
+    requireOfGrowing(ends.size() == 2*growing.size() && events.size() == 3*ends.size() && population.size() == 5 &&
+            times.size() == states.size(), "A State or checkpoint has the growth of another number of chains");
+    vector<MonomerRange> ranges;
+    for (size_t i = 0; i < growing.size(); i++)
+        ranges.push_back({ends[2*i], ends[2*i+1]});
+    GrowthState replaced(system, ranges);
     replaced.steps = columns.getOne<uint64_t>("steps");
+    replaced.time = columns.getOne<double>("time");
     replaced.free = columns.get<long long>("free");
-    for (size_t i = 0; i+1 < ends.size(); i += 2)
-        replaced.ranges.push_back({ends[i], ends[i+1]});
-    for (size_t i = 0; i+4 < events.size(); i += 5)
-        replaced.events.push_back({events[i], events[i+1], events[i+2], events[i+3], events[i+4]});
-    for (int one : columns.get<int>("shrinks"))
-        replaced.shrinks.push_back(one != 0);
+    replaced.endStates = columns.get<int>("endStates");
+    replaced.identities = columns.get<long long>("identities");
+    replaced.parents = columns.get<long long>("parents");
+    replaced.nextIdentity = population[0];
+    replaced.population = {population[1], population[2], population[3], population[4]};
+    size_t nextSwitch = 0, nextMonomer = 0;
+    for (size_t i = 0; i < replaced.events.size(); i++) {
+        EndEvents& own = replaced.events[i];
+        own.gained = events[3*i];
+        own.lost = events[3*i+1];
+        own.waited = events[3*i+2];
+        for (long long& count : own.switches) {
+            requireOfGrowing(nextSwitch < switches.size(), "A State or checkpoint has other states of ends");
+            count = switches[nextSwitch++];
+        }
+    }
+    for (deque<MonomerState>& monomers : replaced.monomers)
+        for (MonomerState& monomer : monomers) {
+            requireOfGrowing(nextMonomer < times.size(), "A State or checkpoint has the states of other monomers");
+            monomer = {times[nextMonomer], states[nextMonomer]};
+            nextMonomer++;
+        }
     setState(replaced);
     if (columns.has("seed"))
         seed = columns.getOne<uint32_t>("seed");

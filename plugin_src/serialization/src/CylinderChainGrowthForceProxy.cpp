@@ -8,12 +8,6 @@
 using namespace OpenMM;
 using namespace std;
 
-/** The names of the rates of a chain, in their order. */
-static const char* const RATES[] = {"minusOnRate", "minusOffRate", "plusOnRate", "plusOffRate"};
-/** Those of an end that has dynamic instability. */
-static const char* const RATES_OF_INSTABILITY[] = {"shrinkingOnRate", "shrinkingOffRate", "catastropheRate",
-        "rescueRate"};
-
 static void write(const CylinderChainGrowthForce& force, SerializationNode& node) {
     SerializationNode& tables = node.createChildNode("Tables");
     for (int i = 0; i < force.getNumTables(); i++) {
@@ -35,21 +29,52 @@ static void write(const CylinderChainGrowthForce& force, SerializationNode& node
     }
     SerializationNode& chains = node.createChildNode("GrowingChains");
     for (int i = 0; i < force.getNumGrowingChains(); i++) {
-        int chain, table, pool, first, last, least;
-        double rates[4];
-        force.getGrowingChainParameters(i, chain, table, pool, first, last, least, rates[0], rates[1], rates[2],
-                rates[3]);
+        int chain, table, pool, first, last, least, minusState, plusState;
+        bool vanishes;
+        double rate;
+        vector<double> shares;
+        force.getGrowingChainParameters(i, chain, table, pool, first, last, least, vanishes);
+        force.getSevering(i, rate, minusState, plusState, shares);
         SerializationNode& own = chains.createChildNode("GrowingChain").setIntProperty("chain", chain)
                 .setIntProperty("table", table).setIntProperty("pool", pool).setIntProperty("firstMonomer", first)
-                .setIntProperty("lastMonomer", last).setIntProperty("leastMonomers", least);
-        for (int k = 0; k < 4; k++)
-            own.setDoubleProperty(RATES[k], rates[k]);
+                .setIntProperty("lastMonomer", last).setIntProperty("leastMonomers", least)
+                .setBoolProperty("vanishes", vanishes)
+                .setBoolProperty("monomersHaveStates", force.getMonomersHaveStates(i))
+                .setDoubleProperty("severingRate", rate).setIntProperty("severedMinusState", minusState)
+                .setIntProperty("severedPlusState", plusState);
+        StateColumns severing;
+        severing.put("shares", shares);
+        severing.write(own.createChildNode("Severing"));
         for (int end : {0, 1}) {
-            force.getDynamicInstability(i, end, rates[0], rates[1], rates[2], rates[3]);
-            SerializationNode& instability = own.createChildNode("DynamicInstability");
-            for (int k = 0; k < 4; k++)
-                instability.setDoubleProperty(RATES_OF_INSTABILITY[k], rates[k]);
+            int initialState;
+            vector<double> rates, switchRates;
+            vector<int> next;
+            force.getEndStates(i, end, initialState, rates, next, switchRates);
+            StateColumns columns;
+            columns.put("initialState", initialState);
+            columns.put("rates", rates);
+            columns.put("statesAfter", next);
+            columns.put("switchRates", switchRates);
+            columns.write(own.createChildNode("End"));
         }
+    }
+    SerializationNode& nucleators = node.createChildNode("Nucleators");
+    for (int i = 0; i < force.getNumNucleators(); i++) {
+        double rate;
+        int order, monomers, region;
+        vector<double> parameters;
+        Vec3 direction;
+        vector<int> members;
+        force.getNucleatorParameters(i, rate, order, monomers, region, parameters, direction, members);
+        StateColumns columns;
+        columns.put("rate", rate);
+        columns.put("order", order);
+        columns.put("monomers", monomers);
+        columns.put("region", region);
+        columns.put("parameters", parameters);
+        columns.put("direction", vector<double> {direction[0], direction[1], direction[2]});
+        columns.put("chains", members);
+        columns.write(nucleators.createChildNode("Nucleator"));
     }
 }
 
@@ -63,18 +88,27 @@ static unique_ptr<CylinderChainGrowthForce> readGrowthForce(const SerializationN
     for (auto& pool : node.getChildNode("Pools").getChildren())
         force->addPool(pool.getDoubleProperty("concentration"), pool.getDoubleProperty("volume"));
     for (auto& own : node.getChildNode("GrowingChains").getChildren()) {
-        double rates[4];
-        for (int k = 0; k < 4; k++)
-            rates[k] = own.getDoubleProperty(RATES[k]);
-        force->addGrowingChain(own.getIntProperty("chain"), own.getIntProperty("table"), own.getIntProperty("pool"),
-                own.getIntProperty("firstMonomer"), own.getIntProperty("lastMonomer"),
-                own.getIntProperty("leastMonomers"), rates[0], rates[1], rates[2], rates[3]);
+        const int index = force->addGrowingChain(own.getIntProperty("chain"), own.getIntProperty("table"),
+                own.getIntProperty("pool"), own.getIntProperty("firstMonomer"), own.getIntProperty("lastMonomer"),
+                own.getIntProperty("leastMonomers"), own.getBoolProperty("vanishes"));
+        force->setMonomersHaveStates(index, own.getBoolProperty("monomersHaveStates"));
+        force->setSevering(index, own.getDoubleProperty("severingRate"), own.getIntProperty("severedMinusState"),
+                own.getIntProperty("severedPlusState"),
+                StateColumns::read(own.getChildNode("Severing")).get<double>("shares"));
         int end = 0;
-        for (auto& instability : own.getChildren()) {
-            for (int k = 0; k < 4; k++)
-                rates[k] = instability.getDoubleProperty(RATES_OF_INSTABILITY[k]);
-            force->setDynamicInstability(force->getNumGrowingChains()-1, end++, rates[0], rates[1], rates[2], rates[3]);
-        }
+        for (auto& child : own.getChildren())
+            if (child.getName() == "End") {
+                const StateColumns columns = StateColumns::read(child);
+                force->setEndStates(index, end++, columns.getOne<int>("initialState"), columns.get<double>("rates"),
+                        columns.get<int>("statesAfter"), columns.get<double>("switchRates"));
+            }
+    }
+    for (auto& nucleator : node.getChildNode("Nucleators").getChildren()) {
+        const StateColumns columns = StateColumns::read(nucleator);
+        const vector<double> direction = columns.get<double>("direction");
+        force->addNucleator(columns.getOne<double>("rate"), columns.getOne<int>("order"),
+                columns.getOne<int>("monomers"), columns.getOne<int>("region"), columns.get<double>("parameters"),
+                Vec3(direction.at(0), direction.at(1), direction.at(2)), columns.get<int>("chains"));
     }
     return force;
 }

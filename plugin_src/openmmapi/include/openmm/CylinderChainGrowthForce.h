@@ -1,17 +1,18 @@
 #ifndef OPENMM_CYLINDERCHAINGROWTHFORCE_H_
 #define OPENMM_CYLINDERCHAINGROWTHFORCE_H_
 
-#include "growth/ChainGrowth.h"
+#include "growth/GrowthSystem.h"
 #include "openmm/Context.h"
 #include "openmm/Force.h"
+#include "openmm/Vec3.h"
 #include <set>
 #include <vector>
 
 namespace OpenMM {
 
 /**
- * This class lets the ends of chains of straight segments gain and lose monomers, with detailed balance.  It has no
- * energy of its own; growth/ChainGrowth.h says how chains grow.
+ * This class lets the ends of chains of straight segments gain and lose monomers, with detailed balance, and chains
+ * begin, vanish and be cut.  It has no energy of its own; growth/ChainGrowth.h says how chains grow.
  *
  * The particles of a chain that grows are its nodes as far as its monomers need them, from the first particle on.  The
  * others are spare: they are where the last node is, and nothing acts on them.  A chain that has no spare node left
@@ -81,53 +82,112 @@ public:
      * @param pool           where its monomers come from
      * @param firstMonomer   the number of its first monomer, at the minus end: joints are at multiples of
      *                       monomersPerSegment
-     * @param lastMonomer    the number behind that of its last monomer
+     * @param lastMonomer    the number behind that of its last monomer.  If both are zero, there is no chain yet: it
+     *                       may begin by a nucleator, or be a part of one that is cut.
      * @param leastMonomers  the fewest monomers that it can have, two or more
-     * @param minusOnRate    the rate at which the minus end gains monomers, per number in a volume, measured in nm^3/ps
-     * @param minusOffRate   the rate at which it loses them, measured in 1/ps
-     * @param plusOnRate     the same of the plus end
-     * @param plusOffRate    the same of the plus end
+     * @param vanishes       whether it vanishes when it loses another one
      * @return the index of the chain among those that grow
      */
     int addGrowingChain(int chain, int table, int pool, int firstMonomer, int lastMonomer, int leastMonomers,
-            double minusOnRate, double minusOffRate, double plusOnRate, double plusOffRate);
+            bool vanishes);
     /**
      * Get the parameters of a chain that grows, see addGrowingChain().
      */
     void getGrowingChainParameters(int index, int& chain, int& table, int& pool, int& firstMonomer, int& lastMonomer,
-            int& leastMonomers, double& minusOnRate, double& minusOffRate, double& plusOnRate,
-            double& plusOffRate) const;
+            int& leastMonomers, bool& vanishes) const;
     /**
-     * Let an end of a chain that grows have dynamic instability: in turn it grows, with the rates of addGrowingChain(),
-     * and shrinks.
+     * Set what an end of a chain that grows does in each of its states.  Without this, it does nothing.
      *
-     * @param index             the index of the chain among those that grow
-     * @param end               the minus end (0) or the plus end (1)
-     * @param shrinkingOnRate   the rate at which it gains monomers while it shrinks, measured in nm^3/ps
-     * @param shrinkingOffRate  the rate at which it loses them then, measured in 1/ps
-     * @param catastropheRate   the rate at which it begins to shrink, measured in 1/ps
-     * @param rescueRate        the rate at which it begins to grow again, measured in 1/ps
+     * @param index         the index of the chain among those that grow
+     * @param end           the minus end (0) or the plus end (1)
+     * @param initialState  the state that it has at first
+     * @param parameters    two for each state: the rate at which it gains monomers, per number in a volume, measured in
+     *                      nm^3/ps, and the rate at which it loses them, measured in 1/ps
+     * @param numbers       two for each state: those in which it is after it has gained or lost a monomer
+     * @param loads         for each state, the rates at which it changes to each of them, measured in 1/ps
      */
-    void setDynamicInstability(int index, int end, double shrinkingOnRate, double shrinkingOffRate,
-            double catastropheRate, double rescueRate);
+    void setEndStates(int index, int end, int initialState, const std::vector<double>& parameters,
+            const std::vector<int>& numbers, const std::vector<double>& loads);
     /**
-     * Get the dynamic instability of an end, see setDynamicInstability(): all rates are zero if it has none.
+     * Get the states of an end, see setEndStates().
      */
-    void getDynamicInstability(int index, int end, double& shrinkingOnRate, double& shrinkingOffRate,
-            double& catastropheRate, double& rescueRate) const;
+    void getEndStates(int index, int end, int& initialState, std::vector<double>& parameters,
+            std::vector<int>& numbers, std::vector<double>& loads) const;
+    /**
+     * Let the states of the ends of a chain be those of the monomers there.  Monomers inside change as they would at the
+     * plus end, and have the state then that they have come to when they are at an end again.
+     *
+     * @param index  the index of the chain among those that grow
+     */
+    void setMonomersHaveStates(int index, bool monomersHaveStates);
+    /**
+     * Get whether the states of the ends of a chain are those of monomers, see setMonomersHaveStates().
+     */
+    bool getMonomersHaveStates(int index) const;
+    /**
+     * Let a chain be cut between any two of its monomers.  Both parts are chains then, for which there must be another
+     * one without monomers: it waits otherwise.
+     *
+     * @param index       the index of the chain among those that grow
+     * @param rate        the rate, for each monomer but one, measured in 1/ps
+     * @param minusState  the state of the minus end that is new, if monomers have no states
+     * @param plusState   the state of the plus end that is new, if monomers have no states
+     * @param parameters  if monomers have states, the share of the rate for each of these, from 0 to 1, or nothing
+     */
+    void setSevering(int index, double rate, int minusState, int plusState, const std::vector<double>& parameters);
+    /**
+     * Get how a chain is cut, see setSevering().
+     */
+    void getSevering(int index, double& rate, int& minusState, int& plusState, std::vector<double>& parameters) const;
+    /**
+     * Get the number of nucleators.
+     */
+    int getNumNucleators() const {
+        return system.nucleators.size();
+    }
+    /**
+     * Add a nucleator, with which chains begin.  All places of a region are as likely for the minus end, and so are
+     * all directions, unless there is one.
+     *
+     * @param rate        the rate in the whole region, at the first concentration of the pool, measured in 1/ps
+     * @param order       the power of the concentration that it is proportional to
+     * @param monomers    the monomers of a chain that begins
+     * @param region      0 for the periodic box, 1 for a cuboid, 2 for a sphere
+     * @param parameters  two corners of the cuboid, or the centre and the radius of the sphere, measured in nm
+     * @param vector      the direction of the first segment, or zero for any
+     * @param numbers     the indices among those that grow of the chains that may begin.  They are made of the same.
+     * @return the index of the nucleator that was added
+     */
+    int addNucleator(double rate, int order, int monomers, int region, const std::vector<double>& parameters,
+            const Vec3& vector, const std::vector<int>& numbers);
+    /**
+     * Get the parameters of a nucleator, see addNucleator().
+     */
+    void getNucleatorParameters(int index, double& rate, int& order, int& monomers, int& region,
+            std::vector<double>& parameters, Vec3& vector, std::vector<int>& numbers) const;
     /**
      * Get how far chains have grown in a Context.
      *
      * @param context          a Context of a System that holds this Force
-     * @param[out] ends        for each chain that grows, the number of its first monomer, and that behind its last one
-     * @param[out] numbers     for each of its ends, minus before plus, one if it shrinks in its dynamic instability,
-     *                         and zero if not
+     * @param[out] ends        for each chain that grows, the number of its first monomer, and that behind its last one:
+     *                         both are zero if there is none now
+     * @param[out] numbers     for each of its ends, minus before plus, its state
      * @param[out] parameters  for each of its ends, how many monomers it has gained, how many it has lost, how often it
-     *                         had no spare node for one, how often it has begun to shrink, and how often it was rescued
+     *                         had no spare node for one, and how often it has changed to each of its states by itself
      * @param[out] loads       for each pool, its concentration, measured in 1/nm^3
      */
     void getGrowthInContext(Context& context, std::vector<int>& ends, std::vector<int>& numbers,
             std::vector<double>& parameters, std::vector<double>& loads) const;
+    /**
+     * Get which chains there are in a Context.
+     *
+     * @param context          a Context of a System that holds this Force
+     * @param[out] parameters  for each chain that grows, which one it is of all that have ever been, counted from zero,
+     *                         and of which of these it was a part when it was cut: -1 for none
+     * @param[out] sums        how many have begun, vanished and were cut, and how often one would have begun or been
+     *                         cut, but there was no chain for it
+     */
+    void getPopulationInContext(Context& context, std::vector<double>& parameters, std::vector<double>& sums) const;
     /**
      * Tell a Context how far its chains have grown at its present positions.  Monomers of closed pools come and go as
      * chains have become longer and shorter.
@@ -145,7 +205,9 @@ public:
     /**
      * Get how far chains have grown before anything happens.
      */
-    cylchain::GrowthState getState() const;
+    cylchain::GrowthState getState() const {
+        return cylchain::GrowthState(system, ranges);
+    }
     /**
      * Let chains have the segments of their monomers.
      *
@@ -159,6 +221,8 @@ public:
 protected:
     ForceImpl* createImpl() const;
 private:
+    cylchain::GrowingChain& getOwn(int index);
+    const cylchain::GrowingChain& getOwn(int index) const;
     cylchain::GrowthSystem system;
     std::vector<cylchain::MonomerRange> ranges;
 };

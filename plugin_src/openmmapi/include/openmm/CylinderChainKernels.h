@@ -253,7 +253,8 @@ public:
      * Take note that chains have grown or shrunk, where this platform has such: see
      * cylchain::LinkerKinetics::setChains().
      */
-    virtual bool setChains(const cylchain::ChainList&, cylchain::LinkerState&) {
+    virtual bool setChains(const cylchain::ChainList&, const std::vector<cylchain::ChainCut>&,
+            cylchain::LinkerState&) {
         return false;
     }
     /**
@@ -302,9 +303,9 @@ public:
      *
      * @param periodic  whether segments are taken as their shortest images
      */
-    virtual int execute(ContextImpl& context, cylchain::GrowthState& state, cylchain::GrowthStep step, bool periodic,
-            cylchain::ChainList& chains, const std::vector<cylchain::Surroundings*>& around,
-            std::vector<int>& changed) = 0;
+    virtual cylchain::GrowthChanges execute(ContextImpl& context, cylchain::GrowthState& state,
+            cylchain::GrowthStep step, bool periodic, cylchain::ChainList& chains,
+            const std::vector<cylchain::Surroundings*>& around) = 0;
     /**
      * Put spare nodes where the last nodes of their chains are.
      */

@@ -18,8 +18,8 @@ public:
     }
     void initialize(const cylchain::GrowthSystem& system, const std::vector<cylchain::BendingModel>& bending,
             const std::vector<cylchain::StretchingModel>& stretching, const std::vector<char>& planar);
-    int execute(ContextImpl& context, cylchain::GrowthState& state, cylchain::GrowthStep step, bool periodic,
-            cylchain::ChainList& chains, const std::vector<cylchain::Surroundings*>& around, std::vector<int>& changed);
+    cylchain::GrowthChanges execute(ContextImpl& context, cylchain::GrowthState& state, cylchain::GrowthStep step,
+            bool periodic, cylchain::ChainList& chains, const std::vector<cylchain::Surroundings*>& around);
     void placeSpareNodes(ContextImpl& context, const std::vector<cylchain::Chain>& chains);
 private:
     std::unique_ptr<cylchain::ChainGrowth> growth;

@@ -16,8 +16,9 @@ public:
     ReferenceUpdateCylinderChainLinkersKernel(std::string name, const Platform& platform, ContextImpl& context);
     void initialize(const cylchain::LinkerSystem& system, const cylchain::ChainList& chains, bool periodic,
             bool nearestParticles);
-    bool setChains(const cylchain::ChainList& chains, cylchain::LinkerState& state) {
-        return kinetics->setChains(chains, state);
+    bool setChains(const cylchain::ChainList& chains, const std::vector<cylchain::ChainCut>& cuts,
+            cylchain::LinkerState& state) {
+        return kinetics->setChains(chains, cuts, state);
     }
     long long execute(ContextImpl& context, cylchain::LinkerState& state, double kT, double stepSize,
             std::uint32_t seed, int force, std::vector<cylchain::Link>& links);

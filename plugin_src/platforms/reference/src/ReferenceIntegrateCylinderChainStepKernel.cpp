@@ -170,7 +170,7 @@ void ReferenceIntegrateCylinderChainStepKernel::exchangePositions(ContextImpl& c
     ReferencePlatform::PlatformData& data = extractData(context);
     for (const Chain& chain : chainKernel->getChains())
         for (int spare : chain.spareNodes)
-            newPositions[spare] = newPositions[chain.nodes.back()];
+            newPositions[spare] = chain.nodes.empty() ? (*data.positions)[spare] : newPositions[chain.nodes.back()];
     data.positions->swap(newPositions);
 #if CYLCHAIN_OPENMM_VERSION >= 804
     data.virtualSites->computePositions(context.getSystem(), *data.positions, data.periodicBoxVectors);

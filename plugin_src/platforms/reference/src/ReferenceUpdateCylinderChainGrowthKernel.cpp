@@ -10,17 +10,18 @@ void ReferenceUpdateCylinderChainGrowthKernel::initialize(const GrowthSystem& sy
     growth = make_unique<ChainGrowth>(system, bending, stretching, planar);
 }
 
-int ReferenceUpdateCylinderChainGrowthKernel::execute(ContextImpl& context, GrowthState& state, GrowthStep step,
-        bool periodic, ChainList& chains, const vector<Surroundings*>& around, vector<int>& changed) {
+GrowthChanges ReferenceUpdateCylinderChainGrowthKernel::execute(ContextImpl& context, GrowthState& state,
+        GrowthStep step, bool periodic, ChainList& chains, const vector<Surroundings*>& around) {
     ReferencePlatform::PlatformData& data = extractData(context);
     step.box = &data.periodicBoxVectors[0][0];
     step.takesNearestImages = periodic;
-    return growth->advance(state, step, chains, &(*data.positions)[0][0], around, changed);
+    return growth->advance(state, step, chains, &(*data.positions)[0][0], around);
 }
 
 void ReferenceUpdateCylinderChainGrowthKernel::placeSpareNodes(ContextImpl& context, const vector<Chain>& chains) {
     vector<Vec3>& positions = *extractData(context).positions;
     for (const Chain& chain : chains)
-        for (int spare : chain.spareNodes)
-            positions[spare] = positions[chain.nodes.back()];
+        if (!chain.nodes.empty())
+            for (int spare : chain.spareNodes)
+                positions[spare] = positions[chain.nodes.back()];
 }

@@ -87,9 +87,9 @@ public:
     virtual void setSpareNodes(ContextImpl&, const std::vector<bool>&) {
     }
     /**
-     * Take note that chains have grown or shrunk, whether they have other nodes or not.
+     * Take note that chains have grown or shrunk, whether they have other nodes or not, or were cut.
      */
-    virtual void chainsHaveGrown(ContextImpl&, const cylchain::ChainList&) {
+    virtual void chainsHaveGrown(ContextImpl&, const cylchain::ChainList&, const std::vector<cylchain::ChainCut>&) {
     }
     /**
      * Describe it as the ends of chains feel it that grow; NULL if it cannot act on them.

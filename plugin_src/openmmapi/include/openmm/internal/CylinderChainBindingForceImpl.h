@@ -57,7 +57,8 @@ public:
     int getOrder() const {
         return 1;
     }
-    void chainsHaveGrown(ContextImpl& context, const cylchain::ChainList& chains);
+    void chainsHaveGrown(ContextImpl& context, const cylchain::ChainList& chains,
+            const std::vector<cylchain::ChainCut>& cuts);
     std::unique_ptr<cylchain::Surroundings> describeSurroundings(const cylchain::ChainList& chains,
             const std::vector<int>& growing);
     std::string getStateName() const {

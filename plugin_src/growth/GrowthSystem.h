@@ -1,0 +1,165 @@
+#ifndef CYLCHAIN_GROWTH_SYSTEM_H_
+#define CYLCHAIN_GROWTH_SYSTEM_H_
+
+#include "couplings/CapsuleGeometry.h"
+#include "mechanics/ChainList.h"
+#include "mechanics/MonomerTable.h"
+#include <cstdint>
+#include <deque>
+#include <vector>
+
+namespace cylchain {
+
+/** What an end does while it is in a state: of growth, of shrinking, of a cap, of its last monomer. */
+struct EndState {
+    /** The rates at which it gains monomers, in nm^3/ps, which is per number in a volume, and loses them, in 1/ps. */
+    double onRate = 0, offRate = 0;
+    /** The states in which it is when it has gained or lost a monomer. */
+    int afterGain = 0, afterLoss = 0;
+    /** The rates, in 1/ps, at which it changes to each state. */
+    std::vector<double> switchRates;
+};
+
+/** An end: its states, and that which it has at first. */
+struct GrowingEnd {
+    std::vector<EndState> states = std::vector<EndState>(1);
+    int initialState = 0;
+    bool grows() const;
+};
+
+/** How a chain is cut at random. */
+struct ChainSevering {
+    /** The rate, in 1/ps, for each monomer but one. */
+    double rate = 0;
+    /** The share of this for monomers of each state, if monomers have states; otherwise it is the same for all. */
+    std::vector<double> shares;
+    /** The states of both ends that are new. */
+    int minusState = 0, plusState = 0;
+};
+
+/** A chain that grows: its number, what it is made of, and its minus (0) and plus end (1). */
+struct GrowingChain {
+    int chain = -1, table = 0, pool = 0;
+    /** The fewest monomers that it has. */
+    int leastMonomers = 2;
+    /** Whether it vanishes when it loses another one, and parts of it that have fewer do. */
+    bool vanishes = false;
+    /**
+     * Whether the states of its ends are those of the monomers there, which change inside as they would at the plus
+     * end.
+     */
+    bool monomersHaveStates = false;
+    GrowingEnd ends[2];
+    ChainSevering severing;
+};
+
+/** Where monomers come from: a concentration that is always the same, or a volume with so many of them. */
+struct MonomerPool {
+    /** The number in 1 nm^3. */
+    double concentration = 0;
+    /** The volume of a pool that runs dry, in nm^3, or zero. */
+    double volume = 0;
+    bool isClosed() const {
+        return volume > 0;
+    }
+};
+
+/** Where chains begin: in the periodic box, in a box of its own, or in a sphere. */
+enum class NucleationRegion : int {PeriodicBox, Cuboid, Sphere};
+
+/** Where and how often chains begin. */
+struct Nucleator {
+    /** The rate, in 1/ps, in all of the region, at the first concentration of the pool. */
+    double rate = 0;
+    /** Which power of the concentration it is proportional to. */
+    int order = 0;
+    /** The monomers of a chain that begins. */
+    int monomers = 2;
+    NucleationRegion region = NucleationRegion::PeriodicBox;
+    /** Two corners of a cuboid. */
+    Vec3d lower = {0, 0, 0}, upper = {0, 0, 0};
+    /** Of a sphere. */
+    Vec3d centre = {0, 0, 0};
+    double radius = 0;
+    /** The direction of its first segment, or zero for any. */
+    Vec3d direction = {0, 0, 0};
+    /** The numbers of the growing chains that may begin, which are all the same but for where they are. */
+    std::vector<int> chains;
+};
+
+/** What grows. */
+struct GrowthSystem {
+    std::vector<MonomerTable> tables;
+    std::vector<MonomerPool> pools;
+    std::vector<GrowingChain> chains;
+    std::vector<Nucleator> nucleators;
+    /** Find the number of monomers of a pool that is closed, at first. */
+    long long countAtFirst(int pool) const;
+};
+
+/** What has happened at an end. */
+struct EndEvents {
+    long long gained = 0, lost = 0;
+    /** How often it would have gained a monomer, but had no spare node. */
+    long long waited = 0;
+    /** How often it has changed to each of its states by itself. */
+    std::vector<long long> switches;
+};
+
+/** What has happened to chains as a whole. */
+struct PopulationEvents {
+    long long nucleated = 0, vanished = 0, severed = 0;
+    /** How often one would have begun, but there was no chain for it. */
+    long long waited = 0;
+};
+
+/** A monomer: the state that it had at a time, in ps. */
+struct MonomerState {
+    double time;
+    int state;
+};
+
+/** What grows, at a time. */
+struct GrowthState {
+    /** The number of steps that were taken, and how long they were. */
+    std::uint64_t steps = 0;
+    double time = 0;
+    /** Of each growing chain, without a monomer if there is none now, and its ends. */
+    std::vector<MonomerRange> ranges;
+    std::vector<EndEvents> events;
+    std::vector<int> endStates;
+    /** Of each chain whose monomers have states, from the first to the last one. */
+    std::vector<std::deque<MonomerState> > monomers;
+    /** The monomers that are free, of each pool that is closed. */
+    std::vector<long long> free;
+    /** Which of all chains that have ever been each of them is, counted from zero, and of which it was a part, or -1. */
+    std::vector<long long> identities, parents;
+    long long nextIdentity = 0;
+    PopulationEvents population;
+    /** Get the state of everything before it has grown. */
+    GrowthState() = default;
+    GrowthState(const GrowthSystem& system, const std::vector<MonomerRange>& ranges);
+};
+
+/** A step in which chains grow. */
+struct GrowthStep {
+    double kT, stepSize;
+    std::uint32_t seed;
+    /** The three vectors of the periodic box, and whether segments are their shortest images in it. */
+    const double* box = nullptr;
+    bool takesNearestImages = false;
+};
+
+/** What a step has changed. */
+struct GrowthChanges {
+    /** The growing chains that have changed, by their numbers among these. */
+    std::vector<int> chains;
+    /** Where chains were cut, one after the other. */
+    std::vector<ChainCut> cuts;
+    /** The number of a growing chain the rates of which are too large for the step, or -1. */
+    int failed = -1;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_GROWTH_SYSTEM_H_*/
