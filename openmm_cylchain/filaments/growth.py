@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -13,11 +14,9 @@ from ..units.quantities import (
     AVOGADRO,
     LENGTH,
     NUMBER_DENSITY,
-    ON_RATE,
     RATE,
     VOLUME,
     as_number_density,
-    in_units_of,
     non_negative,
     positive,
     require_kind,
@@ -25,13 +24,64 @@ from ..units.quantities import (
 )
 from ..units.types import FloatArray, Indices, Scalar
 from .chain_type import ChainType
+from .end_states import GROWING, SHRINKING, DynamicInstability, EndStates, TwoUnitCap, as_on_rate
 from .filament_type import FilamentType
 
-_PER_AMOUNT = unit.liter / unit.mole / unit.second
 _SAME_LENGTH = 1e-6
 """By what share the length of a segment may differ from that of its monomers."""
 _MOST_MONOMERS_OF_SEGMENT = 100_000
 _MOST_MONOMERS_OF_POOL = 1e15
+
+
+@dataclass(frozen=True, kw_only=True)
+class MonomerState:
+    """A state that monomers come to after some time, such as that with ADP, and the rates of ends where they are last.
+
+    Parameters
+    ----------
+    name : str
+    rate : 1/time
+        At which monomers come to it from the state before.
+    plus_off_rate, minus_off_rate : 1/time
+        k_off of such monomers.
+    plus_on_rate, minus_on_rate : volume/time, or 1/(concentration*time), optional
+        k_on of new monomers at such ends; that of ``Monomers`` if not given.
+
+    The attributes hold plain numbers, in nm^3/ps and 1/ps.
+
+    Raises
+    ------
+    InputError
+        For a rate that is negative or not finite.
+    """
+
+    name: str
+    rate: float
+    plus_off_rate: float = 0.0
+    minus_off_rate: float = 0.0
+    plus_on_rate: float | None = None
+    minus_on_rate: float | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            name: str,
+            rate: Scalar,
+            plus_off_rate: Scalar = 0.0,
+            minus_off_rate: Scalar = 0.0,
+            plus_on_rate: Scalar | None = None,
+            minus_on_rate: Scalar | None = None,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        require_kind(self.name, str, "name of a MonomerState")
+        for name in ("rate", "plus_off_rate", "minus_off_rate"):
+            object.__setattr__(self, name, non_negative(getattr(self, name), RATE, f"{self.name}: {name}"))
+        for name in ("plus_on_rate", "minus_on_rate"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, as_on_rate(getattr(self, name), f"{self.name}: {name}"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +96,9 @@ class Monomers:
         k_on of the end at the last and at the first node: an end gains k_on c monomers per time.
     plus_off_rate, minus_off_rate : 1/time
         k_off: it loses so many.
+    aging : sequence of MonomerState, optional
+        To which monomers come one after the other, at random, wherever they are in a filament. New ones are as above;
+        those of a filament that is added are in the last state.
 
     The attributes hold plain numbers, in nm, nm^3/ps and 1/ps.
 
@@ -60,6 +113,7 @@ class Monomers:
     plus_off_rate: float = 0.0
     minus_on_rate: float = 0.0
     minus_off_rate: float = 0.0
+    aging: tuple[MonomerState, ...] = ()
 
     if TYPE_CHECKING:
 
@@ -71,14 +125,36 @@ class Monomers:
             plus_off_rate: Scalar = 0.0,
             minus_on_rate: Scalar = 0.0,
             minus_off_rate: Scalar = 0.0,
+            aging: Sequence[MonomerState] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "aging", tuple(self.aging))
+        for state in self.aging:
+            require_kind(state, MonomerState, "aging")
         object.__setattr__(self, "length", positive(self.length, LENGTH, "length of a monomer"))
         for end in ("plus", "minus"):
             on, off = f"{end}_on_rate", f"{end}_off_rate"
-            object.__setattr__(self, on, _as_on_rate(getattr(self, on), on))
+            object.__setattr__(self, on, as_on_rate(getattr(self, on), on))
             object.__setattr__(self, off, non_negative(getattr(self, off), RATE, off))
+
+    def states(self, end: str) -> EndStates:
+        """Those of the "plus" or "minus" end: one, or those of the last monomer if monomers age."""
+        first_on, first_off = getattr(self, f"{end}_on_rate"), getattr(self, f"{end}_off_rate")
+        on_rates, off_rates = [first_on], [first_off]
+        switches = np.zeros((1 + len(self.aging), 1 + len(self.aging)))
+        for number, state in enumerate(self.aging):
+            own = getattr(state, f"{end}_on_rate")
+            on_rates.append(first_on if own is None else own)
+            off_rates.append(getattr(state, f"{end}_off_rate"))
+            switches[number, number + 1] = state.rate
+        return EndStates(
+            on_rates=on_rates,
+            off_rates=off_rates,
+            switch_rates=switches.tolist(),
+            after_gain=[0] * len(on_rates),
+            names=("new", *(state.name for state in self.aging)) if self.aging else (GROWING,),
+        )
 
     @property
     def treadmilling_concentration(self) -> unit.Quantity:
@@ -133,23 +209,23 @@ class MonomerPool:
 
 
 @dataclass(frozen=True, kw_only=True)
-class DynamicInstability:
-    """An end that grows and shrinks in turn, as those of microtubules do.
+class Severing:
+    """How a filament is cut at random, between any two of its monomers.
 
-    While it grows, it has the rates of its monomers; a catastrophe turns it, and a rescue turns it back. With the speed
-    v+ of growth and v- of shrinking, lengths are exponential with the mean v+ v-/(v- f_cat - v+ f_res) where this is
-    positive, and grow without end otherwise (Dogterom and Leibler, Phys. Rev. Lett. 1993, 70, 1347).
+    Both parts are filaments then, and lengths and bends keep their equilibrium. The part at the plus end becomes one of
+    those that ``Filaments.add_reserve`` has added. A part that is shorter than ``Growth.shortest`` vanishes if filaments
+    vanish, and filaments are not cut there if not.
 
     Parameters
     ----------
-    catastrophe_rate, rescue_rate : 1/time
-        f_cat of a growing end, and f_res of one that shrinks.
-    shrinking_off_rate : 1/time
-        How many monomers it loses per time while it shrinks: v-/length of a monomer.
-    shrinking_on_rate : volume/time, or 1/(concentration*time)
-        k_on while it shrinks.
+    rate : 1/(length*time)
+        How often in a length.
+    of_states : sequence of str, optional
+        Of monomers with states (``Monomers.aging``): the names of those before which it is cut; any if not given.
+    shrinks : bool
+        New plus ends shrink, where these have a dynamic instability.
 
-    The attributes hold plain numbers, in 1/ps and nm^3/ps.
+    The attributes hold plain numbers, in 1/(nm ps).
 
     Raises
     ------
@@ -157,31 +233,18 @@ class DynamicInstability:
         For a rate that is negative or not finite.
     """
 
-    catastrophe_rate: float
-    rescue_rate: float
-    shrinking_off_rate: float
-    shrinking_on_rate: float = 0.0
+    rate: float
+    of_states: tuple[str, ...] = ()
+    shrinks: bool = False
 
     if TYPE_CHECKING:
 
-        def __init__(
-            self,
-            *,
-            catastrophe_rate: Scalar,
-            rescue_rate: Scalar,
-            shrinking_off_rate: Scalar,
-            shrinking_on_rate: Scalar = 0.0,
-        ) -> None: ...
+        def __init__(self, *, rate: Scalar, of_states: Sequence[str] = (), shrinks: bool = False) -> None: ...
 
     def __post_init__(self) -> None:
-        for name in ("catastrophe_rate", "rescue_rate", "shrinking_off_rate"):
-            object.__setattr__(self, name, non_negative(getattr(self, name), RATE, name))
-        object.__setattr__(self, "shrinking_on_rate", _as_on_rate(self.shrinking_on_rate, "shrinking_on_rate"))
-
-    @property
-    def rates(self) -> tuple[float, float, float, float]:
-        """The rates while it shrinks, on and off, and those of catastrophes and rescues."""
-        return self.shrinking_on_rate, self.shrinking_off_rate, self.catastrophe_rate, self.rescue_rate
+        object.__setattr__(self, "rate", non_negative(self.rate, RATE / LENGTH, "rate of severing"))
+        object.__setattr__(self, "of_states", tuple(self.of_states))
+        true_or_false(self.shrinks, "Severing: shrinks")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -207,9 +270,14 @@ class Growth:
         To which it shrinks at most; half a segment if not given.
     plus_capped, minus_capped : bool
         A capped end neither gains nor loses monomers.
-    plus_instability, minus_instability : DynamicInstability, optional
-        Of an end that grows and shrinks in turn. It begins by growing, and one that has shrunk to the end waits to be
-        rescued.
+    plus_instability, minus_instability : DynamicInstability, TwoUnitCap or EndStates, optional
+        Of an end that grows and shrinks in turn, or has states of your own. It begins by growing, and one that has
+        shrunk to the end waits to be rescued, or vanishes.
+    vanishes : bool
+        A filament of the length ``shortest`` vanishes when it loses another monomer. Its place is free for others, see
+        ``Filaments.add_reserve``.
+    severing : Severing, optional
+        How it is cut at random.
 
     Raises
     ------
@@ -223,8 +291,10 @@ class Growth:
     shortest: float | None = None
     plus_capped: bool = False
     minus_capped: bool = False
-    plus_instability: DynamicInstability | None = None
-    minus_instability: DynamicInstability | None = None
+    plus_instability: DynamicInstability | TwoUnitCap | EndStates | None = None
+    minus_instability: DynamicInstability | TwoUnitCap | EndStates | None = None
+    vanishes: bool = False
+    severing: Severing | None = None
 
     if TYPE_CHECKING:
 
@@ -237,8 +307,10 @@ class Growth:
             shortest: Scalar | None = None,
             plus_capped: bool = False,
             minus_capped: bool = False,
-            plus_instability: DynamicInstability | None = None,
-            minus_instability: DynamicInstability | None = None,
+            plus_instability: DynamicInstability | TwoUnitCap | EndStates | None = None,
+            minus_instability: DynamicInstability | TwoUnitCap | EndStates | None = None,
+            vanishes: bool = False,
+            severing: Severing | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -250,15 +322,25 @@ class Growth:
             object.__setattr__(self, "shortest", positive(self.shortest, LENGTH, "shortest"))
             if self.shortest >= self.longest:
                 raise InputError(f"longest must exceed shortest, {self.shortest:g} nm, but is {self.longest:g} nm.")
-        for name in ("plus_capped", "minus_capped"):
+        for name in ("plus_capped", "minus_capped", "vanishes"):
             true_or_false(getattr(self, name), name)
         for end in ("plus", "minus"):
             instability = getattr(self, f"{end}_instability")
             if instability is not None:
-                require_kind(instability, DynamicInstability, f"{end}_instability")
+                require_kind(instability, (DynamicInstability, TwoUnitCap, EndStates), f"{end}_instability")
+                if self.monomers.aging:
+                    raise InputError(
+                        f"Monomers that age decide what ends do: leave {end}_instability, or their aging, out."
+                    )
                 if getattr(self, f"{end}_capped"):
                     raise InputError(f"The {end} end is capped, and has a dynamic instability: leave one of them out.")
-        if self.plus_capped and self.minus_capped:
+        if self.severing is not None:
+            require_kind(self.severing, Severing, "severing")
+            for state in self.severing.of_states:
+                self.monomers.states("plus").find(state)
+            if self.severing.shrinks:
+                self.states("plus").find(SHRINKING)
+        if self.plus_capped and self.minus_capped and self.severing is None:
             raise InputError("A filament with two capped ends does not grow: leave its growth out.")
 
     def rates(self, end: str) -> tuple[float, float]:
@@ -267,10 +349,23 @@ class Growth:
             return 0.0, 0.0
         return getattr(self.monomers, f"{end}_on_rate"), getattr(self.monomers, f"{end}_off_rate")
 
-    def instability(self, end: str) -> DynamicInstability | None:
-        """That of the "plus" or "minus" end."""
-        instability: DynamicInstability | None = getattr(self, f"{end}_instability")
-        return instability
+    def states(self, end: str) -> EndStates:
+        """What the "plus" or "minus" end does in each of its states."""
+        instability = getattr(self, f"{end}_instability")
+        if isinstance(instability, EndStates):
+            return instability
+        if instability is not None:
+            own: EndStates = instability.states(*self.rates(end))
+            return own
+        states = self.monomers.states(end)
+        if not getattr(self, f"{end}_capped"):
+            return states
+        none = (0.0,) * len(states.names)
+        return replace(states, on_rates=none, off_rates=none)
+
+    def rate_at_concentration(self, end: str) -> float:
+        """How many monomers a free end gains less those it loses, in 1/ps, at the concentration of its pool."""
+        return self.states(end).net_rate(self.pool.concentration)
 
     def monomers_per_segment(self, filament_type: FilamentType) -> int:
         """The monomers of a segment; InputError if they are not a whole number from 2 on."""
@@ -297,12 +392,6 @@ class Growth:
         per_segment = self.monomers_per_segment(filament_type)
         most = int(np.ceil(self.longest / self.monomers.length))
         return max(0, most - 2 * (per_segment // 2)) // per_segment + 3
-
-
-def _as_on_rate(rate, name):
-    if isinstance(rate, unit.Quantity) and rate.unit.is_compatible(_PER_AMOUNT):
-        rate = in_units_of(rate, ON_RATE / unit.mole, name) / AVOGADRO
-    return non_negative(rate, ON_RATE, name)
 
 
 def check_growth(

@@ -1,0 +1,261 @@
+"""The states of the end of a filament that grows: growth and shrinking, caps, and models of your own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from openmm import unit
+
+from ..errors import InputError
+from ..units.quantities import AVOGADRO, ON_RATE, RATE, in_units_of, non_negative
+from ..units.types import FloatArray, Scalar
+
+_PER_AMOUNT = unit.liter / unit.mole / unit.second
+_MOST_STATES = 64
+
+
+def as_on_rate(rate: Scalar, name: str) -> float:
+    """A rate per concentration or per number in a volume, in nm^3/ps."""
+    if isinstance(rate, unit.Quantity) and rate.unit.is_compatible(_PER_AMOUNT):
+        rate = in_units_of(rate, ON_RATE / unit.mole, name) / AVOGADRO
+    return non_negative(rate, ON_RATE, name)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EndStates:
+    """What an end does in each of its states, and how it goes from one to another: a model of your own.
+
+    In state i, an end gains monomers at k_on[i] c and loses them at k_off[i], is in state after_gain[i] or
+    after_loss[i] then, and changes to state j by itself at the rate switch_rates[i][j]. It is in state 0 at first.
+
+    Parameters
+    ----------
+    on_rates : (n,) sequence of volume/time, or 1/(concentration*time)
+    off_rates : (n,) sequence of 1/time
+    switch_rates : (n, n) sequence of 1/time
+        Zero from a state to itself.
+    after_gain, after_loss : (n,) sequence of int, optional
+        The state stays as it is if not given.
+    names : (n,) sequence of str, optional
+        For reports; numbers if not given.
+
+    The attributes hold plain numbers, in nm^3/ps and 1/ps.
+
+    Raises
+    ------
+    InputError
+        For another number of values, a rate that is negative or not finite, or a state that there is not.
+    """
+
+    on_rates: tuple[float, ...]
+    off_rates: tuple[float, ...]
+    switch_rates: tuple[tuple[float, ...], ...]
+    after_gain: tuple[int, ...] = ()
+    after_loss: tuple[int, ...] = ()
+    names: tuple[str, ...] = ()
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            on_rates: Sequence[Scalar],
+            off_rates: Sequence[Scalar],
+            switch_rates: Sequence[Sequence[Scalar]],
+            after_gain: Sequence[int] = (),
+            after_loss: Sequence[int] = (),
+            names: Sequence[str] = (),
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        count = len(self.on_rates)
+        if not 1 <= count <= _MOST_STATES:
+            raise InputError(f"An end has from 1 to {_MOST_STATES} states, but on_rates has {count} values.")
+        rows = list(self.switch_rates)
+        if len(self.off_rates) != count or len(rows) != count or any(len(row) != count for row in rows):
+            raise InputError(
+                f"on_rates has {count} values: off_rates must have as many, and switch_rates {count} x {count}."
+            )
+        object.__setattr__(self, "on_rates", tuple(as_on_rate(rate, "on_rates") for rate in self.on_rates))
+        object.__setattr__(self, "off_rates", tuple(non_negative(rate, RATE, "off_rates") for rate in self.off_rates))
+        switches = tuple(tuple(non_negative(rate, RATE, "switch_rates") for rate in row) for row in rows)
+        if any(row[state] != 0.0 for state, row in enumerate(switches)):
+            raise InputError("switch_rates must be zero from a state to itself.")
+        object.__setattr__(self, "switch_rates", switches)
+        for name in ("after_gain", "after_loss"):
+            after = tuple(getattr(self, name)) or tuple(range(count))
+            if len(after) != count or not all(isinstance(state, (int, np.integer)) and 0 <= state < count for state in after):
+                raise InputError(f"{name} must have a number of a state, from 0 to {count - 1}, for each of {count}.")
+            object.__setattr__(self, name, tuple(int(state) for state in after))
+        names = tuple(self.names) or tuple(map(str, range(count)))
+        if len(names) != count or not all(isinstance(name, str) for name in names):
+            raise InputError(f"names must have a string for each of {count} states.")
+        object.__setattr__(self, "names", names)
+
+    def find(self, name: str) -> int:
+        """The number of the state with a name; InputError if there is none."""
+        if name not in self.names:
+            raise InputError(f"There is no end state {name!r}: there are {', '.join(self.names)}.")
+        return self.names.index(name)
+
+    def net_rate(self, concentration: float) -> float:
+        """The mean of what a free end gains, less what it loses, in 1/ps, at a concentration in 1/nm^3.
+
+        The mean over the states that it has in the long run, where these do not depend on which monomer comes to light.
+        """
+        on, off = np.array(self.on_rates) * concentration, np.array(self.off_rates)
+        count = len(on)
+        leaving = np.array(self.switch_rates)
+        for state in range(count):
+            leaving[state, self.after_gain[state]] += on[state]
+            leaving[state, self.after_loss[state]] += off[state]
+        np.fill_diagonal(leaving, 0.0)
+        generator = leaving - np.diag(leaving.sum(axis=1))
+        # From state 0 on: what is never reached has no share.
+        shares = np.zeros(count)
+        reached = _reached_from_first(leaving)
+        conditions = np.vstack([generator[np.ix_(reached, reached)].T, np.ones(len(reached))])
+        shares[reached] = np.linalg.lstsq(conditions, np.eye(len(reached) + 1)[-1], rcond=None)[0]
+        return float(shares @ (on - off))
+
+    def busiest_rate(self, concentration: float) -> float:
+        """How many events an end has per ps in the state where it has most, at a concentration in 1/nm^3."""
+        switches = np.sum(self.switch_rates, axis=1)
+        return float(np.max(np.array(self.on_rates) * concentration + np.array(self.off_rates) + switches))
+
+    def most_gained(self, concentration: float) -> float:
+        """How many monomers an end gains per ps in the state where it gains most, at a concentration in 1/nm^3."""
+        return max(self.on_rates) * concentration
+
+    @property
+    def grows(self) -> bool:
+        """Whether it gains or loses monomers in any state."""
+        return any(self.on_rates) or any(self.off_rates)
+
+
+def _reached_from_first(leaving: FloatArray) -> list[int]:
+    reached, frontier = {0}, [0]
+    while frontier:
+        frontier = [int(to) for to in np.flatnonzero(leaving[frontier.pop()]) if to not in reached] + frontier
+        reached.update(frontier)
+    return sorted(reached)
+
+
+GROWING, SHRINKING = "growing", "shrinking"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DynamicInstability:
+    """An end that grows and shrinks in turn, as those of microtubules do.
+
+    While it grows, it has the rates of its monomers; a catastrophe turns it, and a rescue turns it back. With the speed
+    v+ of growth and v- of shrinking, lengths are exponential with the mean v+ v-/(v- f_cat - v+ f_res) where this is
+    positive, and grow without end otherwise (Dogterom and Leibler, Phys. Rev. Lett. 1993, 70, 1347).
+
+    Parameters
+    ----------
+    catastrophe_rate, rescue_rate : 1/time
+        f_cat of a growing end, and f_res of one that shrinks.
+    shrinking_off_rate : 1/time
+        How many monomers it loses per time while it shrinks: v-/length of a monomer.
+    shrinking_on_rate : volume/time, or 1/(concentration*time)
+        k_on while it shrinks.
+
+    The attributes hold plain numbers, in 1/ps and nm^3/ps.
+
+    Raises
+    ------
+    InputError
+        For a rate that is negative or not finite.
+    """
+
+    catastrophe_rate: float
+    rescue_rate: float
+    shrinking_off_rate: float
+    shrinking_on_rate: float = 0.0
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            catastrophe_rate: Scalar,
+            rescue_rate: Scalar,
+            shrinking_off_rate: Scalar,
+            shrinking_on_rate: Scalar = 0.0,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        for name in ("catastrophe_rate", "rescue_rate", "shrinking_off_rate"):
+            object.__setattr__(self, name, non_negative(getattr(self, name), RATE, name))
+        object.__setattr__(self, "shrinking_on_rate", as_on_rate(self.shrinking_on_rate, "shrinking_on_rate"))
+
+    def states(self, on_rate: float, off_rate: float) -> EndStates:
+        """Of an end with the rates of its monomers, in nm^3/ps and 1/ps: "growing" and "shrinking"."""
+        return EndStates(
+            on_rates=(on_rate, self.shrinking_on_rate),
+            off_rates=(off_rate, self.shrinking_off_rate),
+            switch_rates=((0.0, self.catastrophe_rate), (self.rescue_rate, 0.0)),
+            names=(GROWING, SHRINKING),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoUnitCap:
+    """An end with a cap of two units, which has its catastrophe when both have lost it.
+
+    Each of the last two units hydrolyses at the rate h; one that comes is new. Without losses of growing ends, and with
+    g units that come per time, a new end has its catastrophe after 1/h + (g+h)^2/(h^2 (3g+2h)) on the average (Brun et
+    al., Proc. Natl. Acad. Sci. 2009, 106, 21173). A monomer is a unit here: of microtubules, one of 8 nm, which is 13
+    dimers.
+
+    Parameters
+    ----------
+    hydrolysis_rate : 1/time
+        h of each of both units.
+    shrinking_off_rate : 1/time
+        How many units it loses per time while it shrinks.
+    rescue_rate : 1/time
+        At which it begins to grow again, with a new cap.
+
+    The attributes hold plain numbers, in 1/ps.
+
+    Raises
+    ------
+    InputError
+        For a rate that is negative or not finite.
+    """
+
+    hydrolysis_rate: float
+    shrinking_off_rate: float
+    rescue_rate: float = 0.0
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self, *, hydrolysis_rate: Scalar, shrinking_off_rate: Scalar, rescue_rate: Scalar = 0.0
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        for name in ("hydrolysis_rate", "shrinking_off_rate", "rescue_rate"):
+            object.__setattr__(self, name, non_negative(getattr(self, name), RATE, name))
+
+    def states(self, on_rate: float, off_rate: float) -> EndStates:
+        """Of an end with the rates of its monomers, in nm^3/ps and 1/ps: which of both units are capped, "shrinking"."""
+        h = self.hydrolysis_rate
+        return EndStates(
+            on_rates=(on_rate, on_rate, on_rate, 0.0),
+            off_rates=(off_rate, off_rate, off_rate, self.shrinking_off_rate),
+            switch_rates=(
+                (0.0, h, h, 0.0),
+                (0.0, 0.0, 0.0, h),
+                (0.0, 0.0, 0.0, h),
+                (self.rescue_rate, 0.0, 0.0, 0.0),
+            ),
+            # What was the last unit is the one before it.
+            after_gain=(0, 0, 1, 3),
+            names=("capped", "last unit capped", "unit before capped", SHRINKING),
+        )
