@@ -41,6 +41,7 @@ from openmm_cylchain import (
     wall_force,
 )
 from openmm_cylchain.filaments.grown import GrownChain, longest_segment, monomers_of_segments
+from openmm_cylchain.output.run_tables import GROWTH_TABLE_COLUMNS
 from support.contexts import energy_of, new_context, new_simulation, positions_of
 from support.solvent import TEMPERATURE, VISCOSITY
 
@@ -409,15 +410,19 @@ def test_reporters(tmp_path):
     state = filaments.in_context(simulation.context).growth()
     assert own.filaments == [0, 1] and own["nodes"].shape == (2, 2)
     np.testing.assert_array_equal(own["nodes"][-1], state.nodes)
-    np.testing.assert_array_equal(own["plus_end"][-1], state.monomers[:, 1])
-    np.testing.assert_allclose(own["length_nm"][-1], state.lengths._value)
+    np.testing.assert_array_equal(own["plus end (monomers)"][-1], state.monomers[:, 1])
+    np.testing.assert_allclose(own["length (nm)"][-1], state.lengths._value)
+    np.testing.assert_allclose(own["free monomers (uM)"], 50.0)
     with open(path, newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["step"] for row in rows] == [str(50 * k) for k in (1, 2, 3, 4) for _ in (0, 1)]
+    assert [float(row["time (ms)"]) for row in rows] == [float(row["step"]) * STEP / 1e9 for row in rows]
     assert [row["filament"] for row in rows] == 4 * ["0", "1"]
-    assert float(rows[-1]["concentration_micromolar"]) == pytest.approx(50.0)
     for end, monomers in (("minus", -state.monomers[1, 0]), ("plus", state.monomers[1, 1] - 80)):
-        assert int(rows[-1][f"{end}_gained"]) - int(rows[-1][f"{end}_lost"]) == monomers
+        assert int(rows[-1][f"{end} end gained (monomers)"]) - int(rows[-1][f"{end} end lost (monomers)"]) == monomers
+    table = analysis.read_growth(path)
+    for name in own._columns:
+        np.testing.assert_array_equal(table[name][2:], own[name])
     total = energies["stretching_energy"][-1] + energies["bending_energy"][-1]
     assert total.sum() == pytest.approx(energy_of(simulation.context), rel=1e-9)
     found = filaments.in_context(simulation.context).mean_axial_tensions()
@@ -425,6 +430,26 @@ def test_reporters(tmp_path):
     assert [len(own) for own in found] == [*(state.nodes - 2), 3]
     with pytest.raises(InputError, match="no growth to report"):
         GrowthReporter(None, 1, built(growing(0, still=1))[0])
+
+
+def test_files_of_growth_are_read(tmp_path):
+    """The last of reports with the same step holds; those that are not whole are left out."""
+    path = tmp_path / "mine.csv"
+    header = ",".join(GROWTH_TABLE_COLUMNS)
+    rest = ",0" * (len(GROWTH_TABLE_COLUMNS) - 4)
+    lines = [(0, 3, 1.0), (0, 5, 2.0), (9, 3, 3.0), (9, 5, 4.0), (18, 3, 5.0), (9, 3, 6.0), (9, 5, 7.0), (18, 5, 8.0)]
+    lines += [(27, 3, 9.0)]
+    path.write_text("\n".join([header, *(f"{step},0.5,{own},{length}{rest}" for step, own, length in lines), ""]))
+    table = analysis.read_growth(str(path))
+    np.testing.assert_array_equal(table["length (nm)"], [[1, 2], [6, 7], [5, 8]])
+    np.testing.assert_array_equal(table["filament"], [[3, 5]] * 3)
+    path.write_text(header + "\n")
+    assert analysis.read_growth(path)["nodes"].shape == (0, 0)
+    path.write_text("step,nodes\n1,2\n")
+    with pytest.raises(InputError, match="its columns are 'step,nodes'"):
+        analysis.read_growth(path)
+    with pytest.raises(InputError, match="There is no file"):
+        analysis.read_growth(tmp_path / "none.csv")
 
 
 def test_steps_that_resolve_how_ends_push():
