@@ -2,6 +2,7 @@
 
 import copy
 import csv
+import itertools
 import pickle
 import warnings
 from dataclasses import replace
@@ -261,6 +262,50 @@ def test_forces_that_divide_by_all_distances_are_refused():
         context = in_context(filaments, system, positions, particle_friction=1e5)
         context.getIntegrator().step(20)
         assert np.all(np.isfinite(positions_of(context)))
+
+
+def made_vdw():
+    force = openmm.AmoebaVdwForce()
+    force.addParticle(0, 0.3, 0.2, 1.0)
+    force.setParticleExclusions(0, [0])
+    return force
+
+
+def pair_of(index, force, name):
+    return tuple(sorted(getattr(force, name)(index)[:2]))
+
+
+@pytest.mark.parametrize(
+    ("make", "excluded"),
+    [
+        (
+            openmm.NonbondedForce,
+            lambda f: [pair_of(i, f, "getExceptionParameters") for i in range(f.getNumExceptions())],
+        ),
+        (
+            lambda: openmm.CustomNonbondedForce("1/r"),
+            lambda f: [pair_of(i, f, "getExclusionParticles") for i in range(f.getNumExclusions())],
+        ),
+        (openmm.CustomGBForce, lambda f: [pair_of(i, f, "getExclusionParticles") for i in range(f.getNumExclusions())]),
+        (
+            made_vdw,
+            lambda f: [(i, j) for i in range(f.getNumParticles()) for j in f.getParticleExclusions(i) if i < j],
+        ),
+    ],
+)
+def test_all_pairs_of_nodes_that_may_be_spare_are_excluded_once(make, excluded):
+    force, topology, system, filaments = make(), app.Topology(), openmm.System(), growing(2, still=1)
+    topology.addAtom("A", None, topology.addResidue("A", topology.addChain()))
+    system.addParticle(10.0)
+    if force.getNumParticles() == 0:
+        force.addParticle(*([1.0, 1.0, 1.0] if make is openmm.NonbondedForce else [[]]))
+    system.addForce(force)
+    filaments.add_to(topology, system, [[0, 50, 0]])
+    expected = [pair for own in filaments.node_indices[:2] for pair in itertools.combinations(own[1:].tolist(), 2)]
+    assert len(expected) == 2 * 66 and sorted(excluded(force)) == sorted(expected)
+    if make is openmm.NonbondedForce:
+        parameters = [force.getExceptionParameters(index)[2:] for index in range(force.getNumExceptions())]
+        assert all((own[0]._value, own[2]._value) == (0.0, 0.0) for own in parameters)
 
 
 def test_spare_nodes_are_where_the_last_node_is():
