@@ -1,8 +1,6 @@
 """Filaments that grow: what they are given, what is refused, nodes that come and go, restarts, reporters, steps."""
 
 import copy
-import csv
-import itertools
 import pickle
 import warnings
 from dataclasses import replace
@@ -20,10 +18,8 @@ from openmm_cylchain import (
     BeadSpringType,
     Crosslinks,
     DynamicInstability,
-    FilamentReporter,
     Filaments,
     Growth,
-    GrowthReporter,
     InputError,
     InstabilityError,
     LinkerTable,
@@ -42,8 +38,7 @@ from openmm_cylchain import (
     wall_force,
 )
 from openmm_cylchain.filaments.grown import GrownChain, longest_segment, monomers_of_segments
-from openmm_cylchain.output.run_tables import GROWTH_TABLE_COLUMNS
-from support.contexts import energy_of, new_context, new_simulation, positions_of
+from support.contexts import energy_of, new_context, positions_of
 from support.solvent import TEMPERATURE, VISCOSITY
 
 NM, MICROMOLAR, SECOND = unit.nanometer, unit.Quantity(1e-6, unit.molar), unit.second
@@ -264,50 +259,6 @@ def test_forces_that_divide_by_all_distances_are_refused():
         assert np.all(np.isfinite(positions_of(context)))
 
 
-def made_vdw():
-    force = openmm.AmoebaVdwForce()
-    force.addParticle(0, 0.3, 0.2, 1.0)
-    force.setParticleExclusions(0, [0])
-    return force
-
-
-def pair_of(index, force, name):
-    return tuple(sorted(getattr(force, name)(index)[:2]))
-
-
-@pytest.mark.parametrize(
-    ("make", "excluded"),
-    [
-        (
-            openmm.NonbondedForce,
-            lambda f: [pair_of(i, f, "getExceptionParameters") for i in range(f.getNumExceptions())],
-        ),
-        (
-            lambda: openmm.CustomNonbondedForce("1/r"),
-            lambda f: [pair_of(i, f, "getExclusionParticles") for i in range(f.getNumExclusions())],
-        ),
-        (openmm.CustomGBForce, lambda f: [pair_of(i, f, "getExclusionParticles") for i in range(f.getNumExclusions())]),
-        (
-            made_vdw,
-            lambda f: [(i, j) for i in range(f.getNumParticles()) for j in f.getParticleExclusions(i) if i < j],
-        ),
-    ],
-)
-def test_all_pairs_of_nodes_that_may_be_spare_are_excluded_once(make, excluded):
-    force, topology, system, filaments = make(), app.Topology(), openmm.System(), growing(2, still=1)
-    topology.addAtom("A", None, topology.addResidue("A", topology.addChain()))
-    system.addParticle(10.0)
-    if force.getNumParticles() == 0:
-        force.addParticle(*([1.0, 1.0, 1.0] if make is openmm.NonbondedForce else [[]]))
-    system.addForce(force)
-    filaments.add_to(topology, system, [[0, 50, 0]])
-    expected = [pair for own in filaments.node_indices[:2] for pair in itertools.combinations(own[1:].tolist(), 2)]
-    assert len(expected) == 2 * 66 and sorted(excluded(force)) == sorted(expected)
-    if make is openmm.NonbondedForce:
-        parameters = [force.getExceptionParameters(index)[2:] for index in range(force.getNumExceptions())]
-        assert all((own[0]._value, own[2]._value) == (0.0, 0.0) for own in parameters)
-
-
 def test_spare_nodes_are_where_the_last_node_is():
     filaments, system, positions = built(growing(2, still=1, segments=5), box_vectors=240.0 * np.eye(3))
     assert [len(nodes) for nodes in filaments.node_indices] == [13, 13, 6]
@@ -437,64 +388,6 @@ def test_descriptions_are_pickled():
     shared = growth()
     first, second = pickle.loads(pickle.dumps([shared, growth(pool=shared.pool)]))
     assert first.pool is second.pool and first.monomers == ACTIN_ATP and first.longest == 600.0
-
-
-def test_reporters(tmp_path):
-    """A file that is gone on with, energies of the segments that there are, tensions of joints that come and go."""
-    filaments = growing(2, still=1)
-    topology, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, STEP, random_seed=1, checks=False)
-    simulation = new_simulation(topology, system, positions, integrator)
-    path = tmp_path / "growth.csv"
-    energies, tensions = FilamentReporter(None, 50, filaments), TensionReporter(None, 50, filaments, mean=True)
-    for append in (False, True):
-        own = GrowthReporter(path, 50, filaments, append=append)
-        simulation.reporters[:] = [own, energies, tensions]
-        simulation.step(100)
-        own.close()
-    state = filaments.in_context(simulation.context).growth()
-    assert own.filaments == [0, 1] and own["nodes"].shape == (2, 2)
-    np.testing.assert_array_equal(own["nodes"][-1], state.nodes)
-    np.testing.assert_array_equal(own["plus end (monomers)"][-1], state.monomers[:, 1])
-    np.testing.assert_allclose(own["length (nm)"][-1], state.lengths._value)
-    np.testing.assert_allclose(own["free monomers (uM)"], 50.0)
-    with open(path, newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert [row["step"] for row in rows] == [str(50 * k) for k in (1, 2, 3, 4) for _ in (0, 1)]
-    assert [float(row["time (ms)"]) for row in rows] == [float(row["step"]) * STEP / 1e9 for row in rows]
-    assert [row["filament"] for row in rows] == 4 * ["0", "1"]
-    for end, monomers in (("minus", -state.monomers[1, 0]), ("plus", state.monomers[1, 1] - 80)):
-        assert int(rows[-1][f"{end} end gained (monomers)"]) - int(rows[-1][f"{end} end lost (monomers)"]) == monomers
-    table = analysis.read_growth(path)
-    for name in own._columns:
-        np.testing.assert_array_equal(table[name][2:], own[name])
-    total = energies["stretching_energy"][-1] + energies["bending_energy"][-1]
-    assert total.sum() == pytest.approx(energy_of(simulation.context), rel=1e-9)
-    found = filaments.in_context(simulation.context).mean_axial_tensions()
-    np.testing.assert_allclose(tensions["mean_tension"][-1], [own._value.mean() for own in found])
-    assert [len(own) for own in found] == [*(state.nodes - 2), 3]
-    with pytest.raises(InputError, match="no growth to report"):
-        GrowthReporter(None, 1, built(growing(0, still=1))[0])
-
-
-def test_files_of_growth_are_read(tmp_path):
-    """The last of reports with the same step holds; those that are not whole are left out."""
-    path = tmp_path / "mine.csv"
-    header = ",".join(GROWTH_TABLE_COLUMNS)
-    rest = ",0" * (len(GROWTH_TABLE_COLUMNS) - 4)
-    lines = [(0, 3, 1.0), (0, 5, 2.0), (9, 3, 3.0), (9, 5, 4.0), (18, 3, 5.0), (9, 3, 6.0), (9, 5, 7.0), (18, 5, 8.0)]
-    lines += [(27, 3, 9.0)]
-    path.write_text("\n".join([header, *(f"{step},0.5,{own},{length}{rest}" for step, own, length in lines), ""]))
-    table = analysis.read_growth(str(path))
-    np.testing.assert_array_equal(table["length (nm)"], [[1, 2], [6, 7], [5, 8]])
-    np.testing.assert_array_equal(table["filament"], [[3, 5]] * 3)
-    path.write_text(header + "\n")
-    assert analysis.read_growth(path)["nodes"].shape == (0, 0)
-    path.write_text("step,nodes\n1,2\n")
-    with pytest.raises(InputError, match="its columns are 'step,nodes'"):
-        analysis.read_growth(path)
-    with pytest.raises(InputError, match="There is no file"):
-        analysis.read_growth(tmp_path / "none.csv")
 
 
 def test_steps_that_resolve_how_ends_push():
