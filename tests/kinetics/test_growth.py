@@ -37,7 +37,12 @@ from openmm_cylchain import (
     make_whole,
     wall_force,
 )
-from openmm_cylchain.filaments.grown import GrownChain, longest_segment, monomers_of_segments
+from openmm_cylchain.filaments.grown import (
+    GrownChain,
+    count_nodes_of_monomers,
+    longest_segment,
+    monomers_of_segments,
+)
 from support.contexts import energy_of, new_context, positions_of
 from support.solvent import TEMPERATURE, VISCOSITY
 
@@ -419,6 +424,20 @@ def test_the_shortest_segment_at_an_end_counts_for_steps():
         filaments.add_straight(kind, segments, [0, 0, 0], [1, 0, 0], growth=own)
         steps.append(filaments.recommended_time_step().allowed["rotation"])
     assert steps[0] == pytest.approx(steps[1])
+
+
+def test_filaments_become_longer_than_longest_by_less_than_two_segments():
+    """As many nodes as it has in the worst places of its joints, which others need less of."""
+    for per_segment in (4, 7, 40):
+        kind = F_ACTIN.with_segment_length(per_segment * 2.7)
+        for monomers in range(per_segment, 5 * per_segment):
+            nodes = growth(longest=2.7 * monomers - 1e-9).count_nodes(kind)
+            ends = np.arange(per_segment)[:, None] + np.array([0, 1])
+            needed = [
+                count_nodes_of_monomers(ends + [0, many - 1], per_segment)
+                for many in range(monomers, monomers + 2 * per_segment)
+            ]
+            assert needed[0].max() == nodes and needed[-1].min() > nodes
 
 
 def test_places_of_linkers_on_what_has_grown():
