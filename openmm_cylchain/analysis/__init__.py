@@ -4,6 +4,7 @@ from ..couplings.contact_frames import ContactFrame
 from ..couplings.crosslink_records import CrosslinkFrame
 from ..filaments.spare_nodes import count_nodes
 from ..filaments.topology_nodes import filament_nodes, ring_filaments
+from ..output.read_tables import read_growth
 from . import statistics
 from .bending import (
     TangentCorrelation,
@@ -68,6 +69,7 @@ __all__ = [
     "order_tensor",
     "persistence_length",
     "radii_of_gyration",
+    "read_growth",
     "relaxation_modulus",
     "ring_filaments",
     "segment_lengths",

@@ -19,7 +19,7 @@ from ..errors import InputError, PrecisionWarning
 from ..filaments.grown import GrownChain
 from ..output.dcd_frames import DCDFrames
 from ..output.linker_records import LINKER_RECORD
-from ..output.read_tables import read_reports
+from ..output.read_tables import read_growth, read_reports
 from ..output.record_file import read_records
 from ..output.run_description import DescribedLinkers, RunDescription
 from ..output.run_files import RunFiles
@@ -143,7 +143,8 @@ class Run:
     def growth(self) -> dict[str, FloatArray]:
         """How far filaments have grown: (frames, filaments that grow) arrays by the headers of ``growth.csv``, empty
         without such."""
-        return self._by_frame(self._files.growth)
+        table = read_growth(self._files.growth) if self._files.growth.exists() else {}
+        return {name: values[: len(self)] for name, values in table.items()}
 
     @cached_property
     def wall_forces(self) -> dict[str, FloatArray]:

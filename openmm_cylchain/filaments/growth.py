@@ -264,8 +264,8 @@ class Growth:
     pool : MonomerPool, or a concentration
         Filaments that are given the same pool share it.
     longest : length
-        For which the filament has nodes. An end that has no node left waits, and ``FilamentGrowth.waited`` counts how
-        often.
+        For which the filament has nodes, wherever its joints are: it may become up to two segments longer. An end that
+        has no node left waits, and ``FilamentGrowth.waited`` counts how often.
     shortest : length, optional
         To which it shrinks at most; half a segment if not given.
     plus_capped, minus_capped : bool

@@ -9,15 +9,17 @@ import openmm
 from openmm import unit
 
 from ..engine_choice import load_plugin
+from ..errors import InputError
 from ..filaments.filament import Filament
 from ..filaments.filament_type import FilamentType
 from ..filaments.grown import count_nodes_of_monomers, rest_lengths
 from ..filaments.growth import joints_by_monomers, segments_by_monomers
-from ..units.quantities import AVOGADRO, LENGTH, NUMBER_DENSITY
+from ..units.quantities import AVOGADRO, LENGTH, NUMBER_DENSITY, shown
 from ..units.types import BoolArray, FloatArray, IntArray
 from .first_places import contour_of
 
 GROWTH_FORCE_NAME = "Growth"
+_MOST_MONOMERS = 10**9
 
 
 def is_growth_force(force: openmm.Force) -> bool:
@@ -136,6 +138,32 @@ def growth_of(context: openmm.Context, filaments: Sequence[Filament]) -> Filamen
         counts[:, :, 4],
         unit.Quantity(molar, NUMBER_DENSITY * unit.mole).in_units_of(unit.molar),
     )
+
+
+def set_growth_of(context: openmm.Context, filaments: Sequence[Filament], monomers: Any) -> None:
+    """Tell a Context how far its filaments have grown; InputError for what they cannot be."""
+    force = find_growth_force(context.getSystem())
+    numbers = [force.getGrowingChainParameters(index)[0] for index in range(force.getNumGrowingChains())]
+    ends = np.asarray(monomers)
+    if ends.shape != (len(numbers), 2) or not np.issubdtype(ends.dtype, np.integer):
+        raise InputError(
+            f"monomers must be whole numbers of the shape ({len(numbers)}, 2), for each filament that grows the number "
+            f"of its first monomer and that behind its last one, but are {shown(monomers)}."
+        )
+    for number, (first, last) in zip(numbers, ends.tolist()):
+        own = filaments[number]
+        fewest = own.growth.fewest_monomers(own.type)
+        label = f"Filament {number} ({own.type.name}) cannot have the monomers from {first} to before {last}"
+        if last - first < fewest or max(abs(first), abs(last)) >= _MOST_MONOMERS:
+            raise InputError(f"{label}: it has {fewest} monomers at least, with numbers below {_MOST_MONOMERS:.0e}.")
+        nodes = int(count_nodes_of_monomers(np.array([first, last]), own.growth.monomers_per_segment(own.type)))
+        most = len(own.positions) + own.spare_nodes
+        if nodes > most:
+            raise InputError(f"{label}: they need {nodes} nodes, but it has {most}. Give its growth a larger longest.")
+    try:
+        force.setGrowthInContext(context, ends.ravel().tolist())
+    except openmm.OpenMMException as error:
+        raise InputError(str(error)) from None
 
 
 def contours_in(context: openmm.Context, filaments: Sequence[Filament]) -> list[FloatArray]:

@@ -1,4 +1,7 @@
-"""A reporter of how far filaments have grown, for ``simulation.reporters`` of OpenMM's app layer."""
+"""How far filaments have grown: in tables of runs, and by a reporter for ``simulation.reporters`` of OpenMM."""
+
+from collections.abc import Iterator
+from typing import Any
 
 from openmm import unit
 
@@ -7,21 +10,42 @@ from ..filaments.collection import FilamentCollection, require_filaments
 from ..units.quantities import LENGTH
 from .files import TextFile
 from .reporters import FilamentsReporter
+from .run_tables import GROWTH_TABLE_COLUMNS, MILLISECOND, in_units_of_columns, line_of_table
 
 _OF_END = ("gained", "lost", "waited", "shrinking", "catastrophes", "rescues")
 """What each end has, as FilamentGrowth says."""
 
 
-class GrowthReporter(FilamentsReporter):
-    """Reports how far filaments have grown, a line for each one that grows.
+def rows_of_growth(growth: Any) -> Iterator[tuple[float, ...]]:
+    """What lines of GROWTH_TABLE_COLUMNS say behind step and time, for a FilamentGrowth; none for None."""
+    if growth is None:
+        return
+    lengths = growth.lengths.value_in_unit(LENGTH)
+    concentrations = growth.concentrations.value_in_unit(unit.molar)
+    for index, filament in enumerate(growth.filaments):
+        ends = zip(*(getattr(growth, what)[index] for what in _OF_END))
+        yield (
+            int(filament),
+            float(lengths[index]),
+            int(growth.nodes[index]),
+            *map(int, growth.monomers[index]),
+            *(int(count) for counts in ends for count in counts),
+            float(concentrations[index]),
+        )
 
-    Columns: ``length_nm`` at rest and ``nodes``; ``minus_end`` and ``plus_end``, the number of the first monomer and
-    that behind the last one, from 0 on and as they are at the start: a treadmilling filament goes where these go;
-    ``minus_gained``, ``minus_lost``, ``minus_waited``, ``minus_shrinking``, ``minus_catastrophes``, ``minus_rescues``,
-    and the same of ``plus``: how many monomers each end has gained and lost since the start, how often it would have
-    gained one, but had no spare node, whether it shrinks, 0 or 1, and how often it has turned; and
-    ``concentration_micromolar`` of free monomers in its pool. ``reporter["plus_end"]`` is an array (reports, filaments
-    that grow), in the order of ``reporter.filaments``.
+
+class GrowthReporter(FilamentsReporter):
+    """Reports how far filaments have grown, a line for each one that grows, as ``growth.csv`` of runs does.
+
+    Columns: ``length (nm)`` at rest and ``nodes``; ``minus end (monomers)`` and ``plus end (monomers)``, the number of
+    the first monomer and that behind the last one, from 0 on and as they are at the start: a treadmilling filament goes
+    where these go; ``minus end gained (monomers)``, ``minus end lost (monomers)``, ``minus end waited``,
+    ``minus end shrinking``, ``minus end catastrophes``, ``minus end rescues``, and the same of ``plus end``: how many
+    monomers each end has gained and lost since the start, how often it would have gained one, but had no spare node,
+    whether it shrinks, 0 or 1, and how often it has turned; and ``free monomers (uM)``, the concentration in its pool.
+
+    Before these, the file has ``step``, ``time (ms)`` and ``filament``; ``analysis.read_growth`` reads it.
+    ``reporter["nodes"]`` is an array (reports, filaments that grow), in the order of ``reporter.filaments``.
 
     Parameters
     ----------
@@ -49,15 +73,7 @@ class GrowthReporter(FilamentsReporter):
     >>> simulation.reporters.append(GrowthReporter("growth.csv", 100, filaments))  # doctest: +SKIP
     """
 
-    _columns = (
-        "length_nm",
-        "nodes",
-        "minus_end",
-        "plus_end",
-        *(f"{end}_{what}" for end in ("minus", "plus") for what in _OF_END),
-        "concentration_micromolar",
-    )
-    _thing = "filament"
+    _columns = GROWTH_TABLE_COLUMNS[3:]
     _include = ()
 
     def __init__(
@@ -69,13 +85,14 @@ class GrowthReporter(FilamentsReporter):
             raise InputError("There is no growth to report: give filaments a growth when they are added.")
         super().__init__(file, reportInterval, filaments, append)
 
+    @property
+    def _header(self):
+        return ",".join(GROWTH_TABLE_COLUMNS)
+
+    def _line(self, step, time, number, row):
+        return line_of_table(step, (time / MILLISECOND, number, *row))
+
     def _table(self, simulation, state):
         growth = self._filaments.in_context(simulation.context).growth()
-        lengths = growth.lengths.value_in_unit(LENGTH)
-        concentrations = 1e6 * growth.concentrations.value_in_unit(unit.molar)
-        rows = []
-        for index in range(len(growth.filaments)):
-            ends = zip(*(getattr(growth, what)[index].astype(int) for what in _OF_END))
-            counts = [count for end in ends for count in end]
-            rows.append((lengths[index], growth.nodes[index], *growth.monomers[index], *counts, concentrations[index]))
-        return growth.filaments, rows
+        rows = [in_units_of_columns(self._columns, row[1:]) for row in rows_of_growth(growth)]
+        return self.filaments, rows

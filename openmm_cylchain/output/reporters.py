@@ -53,18 +53,17 @@ class TableReporter(ABC):
         self._reports: list[tuple[int, float]] = []
         self._file: Any = None
         self._owned = isinstance(file, (str, Path))
-        header = ",".join(("step", "time_ps", self._thing, *self._columns))
         stream: Any = file
         if isinstance(file, (str, Path)):
             check_output_path(file)
             if append:
-                _cut_unfinished_line(Path(file), header)
+                _cut_unfinished_line(Path(file), self._header)
             stream = open(file, "a" if append else "w", newline="")  # noqa: SIM115 - closed with the reporter
         elif file is not None and not hasattr(file, "write"):
             raise InputError(f"file must be a path, a file that is open for writing, or None, but is {file!r}.")
         self._file = stream
         if stream is not None and not (append and self._owned and stream.tell() > 0):
-            print(header, file=stream)
+            print(self._header, file=stream)
 
     def describeNextReport(self, simulation: "app.Simulation") -> dict[str, Any]:  # noqa: N802 - OpenMM's name
         """When the next report is due, and that it needs positions; as OpenMM asks for it."""
@@ -80,9 +79,16 @@ class TableReporter(ABC):
         if self._file is None:
             return
         for number, row in zip(numbers, values):
-            cells = (simulation.currentStep, f"{time:.10g}", number, *(f"{value:.10g}" for value in row))
-            print(",".join(str(cell) for cell in cells), file=self._file)
+            print(self._line(simulation.currentStep, time, number, row), file=self._file)
         self._file.flush()
+
+    @property
+    def _header(self) -> str:
+        return ",".join(("step", "time_ps", self._thing, *self._columns))
+
+    def _line(self, step: int, time: float, number: Any, row: Any) -> str:
+        # What the file says of a thing at a time in ps.
+        return ",".join([str(step), f"{time:.10g}", str(number), *(f"{value:.10g}" for value in row)])
 
     @abstractmethod
     def _table(self, simulation, state):

@@ -145,6 +145,8 @@ PULLING_TABLE_COLUMNS = (
 """A line per report and moving tether; the extension is that of the end-to-end vector that points to the tether."""
 
 
+_EVENTS_OF_END = ("gained (monomers)", "lost (monomers)", "waited", "shrinking", "catastrophes", "rescues")
+
 GROWTH_TABLE_COLUMNS = (
     "step",
     "time (ms)",
@@ -153,12 +155,7 @@ GROWTH_TABLE_COLUMNS = (
     "nodes",
     "minus end (monomers)",
     "plus end (monomers)",
-    "gained at the minus end",
-    "lost at the minus end",
-    "waited at the minus end",
-    "gained at the plus end",
-    "lost at the plus end",
-    "waited at the plus end",
+    *(f"{end} end {event}" for end in ("minus", "plus") for event in _EVENTS_OF_END),
     "free monomers (uM)",
 )
 """A line per report and filament that grows; ends are where they are since the start, in monomers along the filament,
@@ -194,14 +191,32 @@ _SIZES = {"ms": MILLISECOND, "nm": 1.0, "pN": PICONEWTON, "pN nm": PICONEWTON, "
 # In OpenMM's units; but energies in kT and concentrations in mol/l come as such.
 
 
-def check_columns(path: Path, header: str) -> None:
-    """Raise InputError if a table has other columns, or other units, than it is written with."""
-    expected = ",".join(TABLE_COLUMNS.get(path.name, (header,)))
+def check_columns(path: Path, header: str, columns: Sequence[str] | None = None) -> None:
+    """Raise InputError if a table has other columns, or other units, than it is written with.
+
+    These are ``columns``, or if not given those of a table of a run by the name of its file.
+    """
+    expected = ",".join(TABLE_COLUMNS.get(path.name, (header,)) if columns is None else columns)
     if header != expected:
         raise InputError(
             f"{path} was written by another version of openmm_cylchain: its columns are {header!r}, but now "
             f"{expected!r}. Take that version, or run it again in another directory."
         )
+
+
+def in_units_of_columns(columns: Sequence[str], values: Sequence[float]) -> tuple[float, ...]:
+    """Numbers in OpenMM's units (NaN where one has no meaning) in the units that the names of their columns say.
+
+    Energies in kT and concentrations in mol/l come as such.
+    """
+    units = (name.partition("(")[2].rstrip(")") for name in columns)
+    pairs = zip(values, units, strict=True)
+    return tuple(value if isinstance(value, int) else float(value) / _SIZES.get(unit, 1.0) for value, unit in pairs)
+
+
+def line_of_table(step: int, cells: Sequence[float]) -> str:
+    """A line of a table: a step, and numbers to the last digit."""
+    return ",".join(map(repr, (step, *cells)))
 
 
 class ReportTable:
@@ -211,12 +226,10 @@ class ReportTable:
     """
 
     def __init__(self, path: Path, size: int | None = None) -> None:
-        columns = TABLE_COLUMNS[path.name]
-        units = (name.partition("(")[2].rstrip(")") for name in columns[1:])
-        self._sizes = [_SIZES.get(name, 1.0) for name in units]
+        self._columns = TABLE_COLUMNS[path.name]
         if size is None:
             self._file = open(path, "w+b")
-            self._file.write((",".join(columns) + "\n").encode())
+            self._file.write((",".join(self._columns) + "\n").encode())
         else:
             self._file = _open_at(path, size)
             self._file.seek(0)
@@ -224,15 +237,9 @@ class ReportTable:
             self._file.seek(0, os.SEEK_END)
 
     def write(self, step: int, values: Sequence[float]) -> None:
-        """Append a line: the step and a number in OpenMM's units for each further column (NaN where it has no meaning).
-
-        Energies in kT and concentrations in mol/l come as such.
-        """
-        cells = (
-            str(value) if isinstance(value, int) else repr(float(value) / size)
-            for value, size in zip(values, self._sizes, strict=True)
-        )
-        self._file.write(",".join([str(step), *cells]).encode() + b"\n")
+        """Append a line: the step and a number for each further column, as ``in_units_of_columns`` takes them."""
+        cells = in_units_of_columns(self._columns[1:], values)
+        self._file.write(line_of_table(step, cells).encode() + b"\n")
         self._file.flush()
 
     def synchronise(self) -> int:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..output.read_tables import read_reports
+from ..output.read_tables import read_growth
 from ..output.run_tables import MILLISECOND
 from ..units.quantities import AVOGADRO
 from .summary import group_labels, mean_over_filaments
@@ -45,7 +45,7 @@ class GrowthTable:
     """The growth.csv of a run: columns (reports, filaments) by their names, of all that grow or of one table."""
 
     def __init__(self, directory):
-        self._columns = read_reports(directory.growth)
+        self._columns = read_growth(directory.growth)
         self.times = self._columns["time (ms)"][:, 0] * MILLISECOND
 
     def column(self, name, filaments=None):
@@ -94,7 +94,8 @@ def summarise_growth(configuration, members, directory):
 
 
 def _summarise(table, growth, numbers, label, end):
-    counts = [int(table.column(f"{what} at the {end} end", numbers)[-1].sum()) for what in ("gained", "lost", "waited")]
+    events = "gained (monomers)", "lost (monomers)", "waited"
+    counts = [int(table.column(f"{end} end {what}", numbers)[-1].sum()) for what in events]
     gains = np.diff(table.ends(end, numbers), axis=0) / np.diff(table.times)[:, None] * _SECOND
     rate, error = mean_over_filaments(gains) if len(gains) > 1 else (float(gains.mean()), float("nan"))
     concentration = float(table.column("free monomers (uM)", numbers).mean())

@@ -16,6 +16,7 @@ from ..engines.description import describe_lengths, filament_label
 from ..engines.gpu_platforms import GPU_PLATFORMS, enable_platform
 from ..errors import InputError, InstabilityError
 from ..mechanics.broken_segment import find_broken_segment
+from ..output.growth_reporter import rows_of_growth
 from ..output.linker_records import LinkerFile, measure_linkers
 from ..output.progress import RunProgress
 from ..output.run_tables import ReportTable, TrajectoryFile
@@ -23,7 +24,6 @@ from ..systems.described_runs import (
     energies_of_growing,
     energy_cells,
     growth_in,
-    rows_of_growth,
     total_energies,
     write_topology,
 )

@@ -2,12 +2,11 @@
 
 import dataclasses
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import openmm
-from openmm import unit
 
 from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..couplings.shapes import Shape
@@ -25,7 +24,6 @@ from ..output.run_description import (
 )
 from ..output.run_files import RunFiles
 from ..output.structure_files import write_lammps_data, write_mmcif, write_psf
-from ..units.quantities import LENGTH
 from ..units.types import FloatArray
 from .insertion import filament_masses
 
@@ -240,21 +238,3 @@ def energy_cells(
         bending / bends / kT if bends and kT else np.nan,
         float(np.mean(np.linalg.norm(positions[ends[:, 1]] - positions[ends[:, 0]], axis=1))),
     )
-
-
-def rows_of_growth(growth: FilamentGrowth | None) -> Iterator[tuple[float, ...]]:
-    """What lines of GROWTH_TABLE_COLUMNS say behind step and time, for a FilamentGrowth; none for None."""
-    if growth is None:
-        return
-    lengths = growth.lengths.value_in_unit(LENGTH)
-    concentrations = growth.concentrations.value_in_unit(unit.molar)
-    for index, filament in enumerate(growth.filaments):
-        ends = zip(growth.gained[index], growth.lost[index], growth.waited[index])
-        yield (
-            int(filament),
-            float(lengths[index]),
-            int(growth.nodes[index]),
-            *map(int, growth.monomers[index]),
-            *(int(count) for counts in ends for count in counts),
-            float(concentrations[index]),
-        )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -199,7 +198,7 @@ class Filaments(TiedFilaments):
         for number, nodes in enumerate(self._nodes):
             if self._filaments[number].spare_nodes:
                 # Any node but the first may become a spare one.
-                yield from combinations(nodes[1:].tolist(), 2)
+                yield tuple(nodes[1:].tolist())
             mine = self._attachments_of[number]
             yield from neighbors([self._attachments[index] for index in mine], self._attachment_indices[mine], nodes)
 

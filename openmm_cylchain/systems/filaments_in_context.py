@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 import openmm
 from openmm import unit
 
@@ -23,7 +24,7 @@ from ..kinetics.binding_force import (
     set_table,
     table_of,
 )
-from ..kinetics.growth_force import FilamentGrowth, contours_in, growth_of
+from ..kinetics.growth_force import FilamentGrowth, contours_in, growth_of, set_growth_of
 from ..kinetics.linker_table import LinkerTable
 from ..kinetics.linkers import LinkerPulls
 from ..mechanics.flow import Flow
@@ -68,10 +69,40 @@ class FilamentsInContext:
         InputError
             If none of them grow, or the Context has got a State that does not say how far they have.
         """
-        if not any(filament.growth is not None for filament in self._placed.filaments):
-            raise InputError("No filaments grow: give some a growth when they are added.")
+        self._refuse_if_none_grows()
         with naming_unknown_linkers():
             return growth_of(self._context, self._placed.filaments)
+
+    def set_growth(self, monomers: npt.ArrayLike) -> None:
+        """Tell the Context how far the filaments that grow have grown at its positions.
+
+        The first particles of a filament are taken for its nodes, and the others go to the last of these. What ends
+        have gained and lost, and whether they shrink, stays as it was; a closed pool has less monomers by those that
+        filaments have more than before.
+
+        Parameters
+        ----------
+        monomers : (n, 2) int array
+            As ``FilamentGrowth.monomers``: for each filament that grows, in their order, the number of its first
+            monomer and that behind its last one.
+
+        Raises
+        ------
+        InputError
+            If none of them grow, for an array of another shape or kind, and for numbers for which a filament is too
+            short, has not nodes enough, or a pool has not monomers enough.
+
+        Examples
+        --------
+        >>> context.setPositions(run.positions(-1))  # doctest: +SKIP
+        >>> filaments.in_context(context).set_growth(list(run.monomers(-1).values()))  # doctest: +SKIP
+        """
+        self._refuse_if_none_grows()
+        set_growth_of(self._context, self._placed.filaments, monomers)
+
+    def _refuse_if_none_grows(self):
+        if not any(filament.growth is not None for filament in self._placed.filaments):
+            raise InputError("No filaments grow: give some a growth when they are added.")
 
     def linkers(self) -> LinkerTable:
         """The linkers that there are, and where they are bound: a LinkerTable.

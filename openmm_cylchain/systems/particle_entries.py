@@ -4,7 +4,9 @@ Most such forces have parameters of a particle that does not interact. A CustomN
 parameter more, which their energies are asked by; energies of what was there stay as they are to the last digit.
 """
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
+from itertools import combinations
 
 import numpy as np
 import openmm
@@ -111,7 +113,7 @@ def _has_pairs_without_exclusions(force):
 
 
 def add_noninteracting_entries(
-    system: openmm.System, existing: int, positions: FloatArray, coinciding: Iterable[tuple[int, int]]
+    system: openmm.System, existing: int, positions: FloatArray, coinciding: Iterable[tuple[int, ...]]
 ) -> None:
     """Give forces that ask for an entry of every particle those of particles that do not interact.
 
@@ -122,21 +124,19 @@ def add_noninteracting_entries(
         Number of particles that have entries; the others are of filaments.
     positions : (particles, 3) array
         In nm; of all particles, for forces with a reference structure.
-    coinciding : pairs of int
-        Particles of filaments that may be in one place.
+    coinciding : tuples of int
+        Particles of filaments that may all be in one place. Those of more than two are in no other one.
     """
     added = range(existing, system.getNumParticles())
     forces = [own for outer in system.getForces() for own in _with_those_within(outer)]
-    # Spare nodes have so many pairs that they are counted out only where a force wants them.
-    pairs = list(coinciding) if any(type(force).__name__ in _EXCLUSIONS for force in forces) else []
+    groups = list(coinciding)
     for force in forces:
         kind = type(force).__name__
         if kind in _ENTRIES:
             _ENTRIES[kind](force, added)
         if kind in _EXCLUSIONS:
             # Particles in one place would give 0/0, even if they do not interact.
-            for pair in pairs:
-                _EXCLUSIONS[kind](force, pair)
+            _EXCLUSIONS[kind](force, groups)
         if kind in _OF_ALL_PARTICLES and existing and not Crosslinks.of_force(force) and not force.getParticles():
             force.setParticles(list(range(existing)))
         if kind in _WITH_REFERENCE:
@@ -233,9 +233,34 @@ def _add_to_amoeba_vdw(force, added):
         force.setParticleExclusions(particle, [particle])
 
 
-def _exclude_from_amoeba_vdw(force, pair):
-    for one, other in (pair, pair[::-1]):
-        force.setParticleExclusions(one, sorted({*force.getParticleExclusions(one), other}))
+def _pairs(groups):
+    return (pair for group in groups for pair in combinations(group, 2))
+
+
+def _excluding(add, exclude_bonded):
+    # Spare nodes have so many pairs that OpenMM counts them out, as particles that are bonded to the same one.
+    def exclude(force, groups):
+        bonds = [(group[0], other) for group in groups if len(group) > 2 for other in group[1:]]
+        if bonds:
+            exclude_bonded(force, bonds)
+        for pair in _pairs(group for group in groups if len(group) == 2):
+            add(force, pair)
+
+    return exclude
+
+
+def _exclude_from_custom_gb(force, groups):
+    for pair in _pairs(groups):
+        force.addExclusion(*pair)
+
+
+def _exclude_from_amoeba_vdw(force, groups):
+    excluded = defaultdict(set)
+    for group in groups:
+        for particle in group:
+            excluded[particle].update(group)
+    for particle, others in excluded.items():
+        force.setParticleExclusions(particle, sorted({*force.getParticleExclusions(particle), *others}))
 
 
 _FREE_AXES = (openmm.AmoebaMultipoleForce.NoAxisType, -1, -1, -1)
@@ -260,11 +285,20 @@ _ENTRIES: dict[str, Callable[[openmm.Force, range], None]] = {
     ),
 }
 """How to add entries of a range of particles to a force, by its class."""
-_EXCLUSIONS: dict[str, Callable[[openmm.Force, tuple[int, int]], None]] = {
-    "NonbondedForce": lambda force, pair: force.addException(*pair, 0.0, 1.0, 0.0),
-    "ConstantPotentialForce": lambda force, pair: force.addException(*pair, 0.0),
-    "CustomNonbondedForce": lambda force, pair: force.addExclusion(*pair),
-    "CustomGBForce": lambda force, pair: force.addExclusion(*pair),
+_EXCLUSIONS: dict[str, Callable[[openmm.Force, list[tuple[int, ...]]], None]] = {
+    "NonbondedForce": _excluding(
+        lambda force, pair: force.addException(*pair, 0.0, 1.0, 0.0),
+        lambda force, bonds: force.createExceptionsFromBonds(bonds, 0.0, 0.0),
+    ),
+    "ConstantPotentialForce": _excluding(
+        lambda force, pair: force.addException(*pair, 0.0),
+        lambda force, bonds: force.createExceptionsFromBonds(bonds, 0.0),
+    ),
+    "CustomNonbondedForce": _excluding(
+        lambda force, pair: force.addExclusion(*pair),
+        lambda force, bonds: force.createExclusionsFromBonds(bonds, 2),
+    ),
+    "CustomGBForce": _exclude_from_custom_gb,
     "AmoebaVdwForce": _exclude_from_amoeba_vdw,
 }
 _OF_ALL_PARTICLES = ("RGForce", "RMSDForce", "OrientationRestraintForce", "PythonForce")

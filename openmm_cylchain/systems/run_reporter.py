@@ -16,6 +16,7 @@ from ..couplings.periodicity import is_periodic
 from ..couplings.shapes import Shape
 from ..errors import InputError
 from ..output.files import as_path
+from ..output.growth_reporter import rows_of_growth
 from ..output.linker_records import LinkerFile, measure_linkers
 from ..output.record_file import read_records
 from ..output.run_files import RunFiles
@@ -41,7 +42,6 @@ from .described_runs import (
     energies_of_growing,
     energy_cells,
     growth_in,
-    rows_of_growth,
     total_energies,
     write_topology,
 )

@@ -2,8 +2,9 @@
 
 Free ends gain and lose monomers at their rates whatever the step is, and lengths and bends keep their equilibrium. The
 segment at an end has half as many monomers as others at least: where a rule depends on what a segment is, that one
-counts. An end that pushes a wall or another filament gains monomers while all else stands still, so that a step should
-see few of them: ``k_on c dt`` is a fifth at most.
+counts. How far segments turn in a step is that of the filament as it is at first; the relaxation that steps resolve is
+that of the longest filament. An end that pushes a wall or another filament gains monomers while all else stands still,
+so that a step should see few of them: ``k_on c dt`` is a fifth at most.
 """
 
 import warnings
@@ -32,17 +33,20 @@ _MOST_EVENTS = 1e5
 _PER_SECOND = 1e12
 
 
-def kind_of_segments(filament: Filament) -> tuple[ChainType, int, float]:
-    """The type of a filament, its number of segments, and their propulsion.
+def kind_of_segments(filament: Filament) -> tuple[ChainType, int, float, int | None]:
+    """The type of a filament, its number of segments, their propulsion, and None.
 
-    If it grows, those of a filament of its length, all of whose segments are as short as one at an end may be.
+    If it grows, those of a filament of its length, all of whose segments are as short as one at an end may be; and in
+    place of None how many it has when it is longest.
     """
     growth, kind = filament.growth, filament.type
     if growth is None or not isinstance(kind, FilamentType):
-        return kind, filament.segments, filament.propulsion
+        return kind, filament.segments, filament.propulsion, None
     shortest = (growth.monomers_per_segment(kind) // 2) * growth.monomers.length
     share = shortest / kind.segment_length
-    return segment_of_length(kind, shortest), max(1, round(filament.segments / share)), filament.propulsion * share
+    segments = max(1, round(filament.segments / share))
+    longest = max(segments, round(growth.longest / shortest))
+    return segment_of_length(kind, shortest), segments, filament.propulsion * share, longest
 
 
 def steps_of_growth(filaments: FilamentCollection, system: openmm.System) -> list[TimeStep]:

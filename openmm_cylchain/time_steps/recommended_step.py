@@ -68,6 +68,7 @@ def recommended_time_step(
     flow: Flow | None = None,
     friction: SegmentFriction | None = None,
     propulsion: float = 0.0,
+    longest: int | None = None,
 ) -> TimeStep:
     """The step at which equilibrium energies of a chain are good to about 5 %.
 
@@ -101,6 +102,9 @@ def recommended_time_step(
         Of a segment; that at the given temperature if not given.
     propulsion : float
         F0 of self-propelled filaments, in kJ/(mol nm); matters only to beam elements.
+    longest : int, optional
+        Segments of a filament that grows when it has grown; matters only to "implicit", which resolves the relaxation
+        of the filament then.
 
     Returns
     -------
@@ -110,6 +114,7 @@ def recommended_time_step(
     check_scheme(scheme)
     require_kind(filament_type, ChainType, "filament_type")
     segments, closed, flow = whole_number(segments, 1, "segments"), true_or_false(closed, "closed"), as_flow(flow)
+    longest = None if longest is None else whole_number(longest, segments, "longest")
     propulsion = finite_number(propulsion, ENERGY / LENGTH, "propulsion")
     if friction is not None:
         require_kind(friction, SegmentFriction, "friction")
@@ -124,7 +129,9 @@ def recommended_time_step(
     if not filament_type.segment_kind.straight:
         return beam_time_step(filament_type, temperature, scheme, segments, flow, friction, propulsion, closed)
     if scheme in IMPLICIT_SCHEMES:
-        return implicit_time_step(filament_type, viscosity, temperature, segments, closed, flow, friction, scheme)
+        return implicit_time_step(
+            filament_type, viscosity, temperature, segments, closed, flow, friction, scheme, longest
+        )
     bounds = bounds_of_chain(filament_type, friction, segments)
     allowed = {name: bound / _ACCURACY_MARGIN for name, bound in bounds.items()}
     kT = thermal_energy(temperature)
@@ -245,6 +252,7 @@ def implicit_time_step(
     flow: Flow | None = None,
     friction: SegmentFriction | None = None,
     scheme: str = "implicit",
+    longest: int | None = None,
 ) -> TimeStep:
     """The step of an implicit scheme at which equilibrium energies of a chain are good to 2 %, and dynamics to 5 %.
 
@@ -258,7 +266,8 @@ def implicit_time_step(
     also resolve the slowest relaxation of the filament, by 20 steps, or 2 of scheme "implicit-second-order", which is
     1 % too fast there: gamma_perp/(l0 a) (L/4.73)^4, or that of the mode in which a ring of radius R becomes oval,
     gamma_perp/(l0 a) R^4/9 = gamma_perp/(l0 a) (L/10.9)^4. (With the friction along the ring it is (gamma_perp +
-    gamma_par/4)/(l0 a) R^4/9.)
+    gamma_par/4)/(l0 a) R^4/9.) Of a filament that grows that is the relaxation when it is longest: those of shorter
+    ones are over within a step then, and bends and lengths are in equilibrium all the same.
 
     Stiff lengths do not bound the step, nor does their friction: that acts on true changes of a length, so a segment
     turns freely however slowly its length relaxes, and the length needs a run that is longer than tau_l, not shorter
@@ -287,9 +296,10 @@ def implicit_time_step(
     if _SOFT_LENGTHS * _length_variance(filament_type, kT) > _SOFT_LENGTH_ERROR * segments:
         bounds["soft lengths"] = _LENGTH_DIFFUSION * segments * friction.extensional / kT
     allowed = dict(bounds)
-    if bends:
+    most = segments if longest is None else longest
+    if most > 1 and rigidity > 0.0:
         wave_number = _OVAL_MODE if closed else 4.73
-        bounds["relaxation"] = friction_per_length * (segments * length / wave_number) ** 4 / rigidity
+        bounds["relaxation"] = friction_per_length * (most * length / wave_number) ** 4 / rigidity
         allowed["relaxation"] = bounds["relaxation"] / _relaxation_steps(scheme)
     angle = math.sqrt(square_angle)
     return _binding(filament_type, friction, temperature, scheme, segments, flow, bounds, allowed, angle)

@@ -77,8 +77,11 @@ def _steps_of_types(filaments, scheme, temperature, flow):
             flow,
             kind.segment_friction(*solvent, segments),
             propulsion,
+            longest,
         )
-        for kind, segments, propulsion, closed in dict.fromkeys((*kind_of_segments(f), f.closed) for f in filaments)
+        for kind, segments, propulsion, longest, closed in dict.fromkeys(
+            (*kind_of_segments(f), f.closed) for f in filaments
+        )
     ]
 
 

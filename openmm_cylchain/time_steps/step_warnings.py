@@ -45,11 +45,12 @@ def warn_of_long_step(
     """
     warn_if_strained(step, flow)
     solvent = filaments.viscosity, filaments.temperature
-    for kind, segments, propulsion, closed in dict.fromkeys((*kind_of_segments(f), f.closed) for f in filaments):
+    kinds = dict.fromkeys((*kind_of_segments(f), f.closed) for f in filaments)
+    for kind, segments, propulsion, longest, closed in kinds:
         warn_if_driven_far(kind, *solvent, step, segments, propulsion)
         if not warn_if_unstable(kind, *solvent, step, segments, scheme):
             friction = kind.segment_friction(*solvent, segments)
-            warn_if_far_above(kind, solvent[0], temperature, step, segments, scheme, closed, friction)
+            warn_if_far_above(kind, solvent[0], temperature, step, segments, scheme, closed, friction, longest)
             warn_if_fene_is_wrong(kind, temperature, step, friction, scheme)
     coupled = CoupledForces(system)
     forces = ExplicitForces(system, filaments, scheme, particle_friction, coupled)
@@ -99,6 +100,7 @@ def warn_if_far_above(
     scheme: str = "midpoint",
     closed: bool = False,
     friction: SegmentFriction | None = None,
+    longest: int | None = None,
 ) -> None:
     """Issue a TimeStepWarning if ``step`` exceeds the recommended step of a chain by more than a factor of four.
 
@@ -107,7 +109,7 @@ def warn_if_far_above(
     """
     step = as_step(step, "time step")
     recommended = recommended_time_step(
-        filament_type, viscosity, temperature, scheme, segments, closed, friction=friction
+        filament_type, viscosity, temperature, scheme, segments, closed, friction=friction, longest=longest
     )
     if step > _FAR_ABOVE * recommended.step and IDLE not in recommended.bounds:
         warnings.warn(

@@ -1,7 +1,6 @@
 """Filaments that grow: what they are given, what is refused, nodes that come and go, restarts, reporters, steps."""
 
 import copy
-import csv
 import pickle
 import warnings
 from dataclasses import replace
@@ -19,10 +18,8 @@ from openmm_cylchain import (
     BeadSpringType,
     Crosslinks,
     DynamicInstability,
-    FilamentReporter,
     Filaments,
     Growth,
-    GrowthReporter,
     InputError,
     InstabilityError,
     LinkerTable,
@@ -40,8 +37,13 @@ from openmm_cylchain import (
     make_whole,
     wall_force,
 )
-from openmm_cylchain.filaments.grown import GrownChain, longest_segment, monomers_of_segments
-from support.contexts import energy_of, new_context, new_simulation, positions_of
+from openmm_cylchain.filaments.grown import (
+    GrownChain,
+    count_nodes_of_monomers,
+    longest_segment,
+    monomers_of_segments,
+)
+from support.contexts import energy_of, new_context, positions_of
 from support.solvent import TEMPERATURE, VISCOSITY
 
 NM, MICROMOLAR, SECOND = unit.nanometer, unit.Quantity(1e-6, unit.molar), unit.second
@@ -393,40 +395,6 @@ def test_descriptions_are_pickled():
     assert first.pool is second.pool and first.monomers == ACTIN_ATP and first.longest == 600.0
 
 
-def test_reporters(tmp_path):
-    """A file that is gone on with, energies of the segments that there are, tensions of joints that come and go."""
-    filaments = growing(2, still=1)
-    topology, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, STEP, random_seed=1, checks=False)
-    simulation = new_simulation(topology, system, positions, integrator)
-    path = tmp_path / "growth.csv"
-    energies, tensions = FilamentReporter(None, 50, filaments), TensionReporter(None, 50, filaments, mean=True)
-    for append in (False, True):
-        own = GrowthReporter(path, 50, filaments, append=append)
-        simulation.reporters[:] = [own, energies, tensions]
-        simulation.step(100)
-        own.close()
-    state = filaments.in_context(simulation.context).growth()
-    assert own.filaments == [0, 1] and own["nodes"].shape == (2, 2)
-    np.testing.assert_array_equal(own["nodes"][-1], state.nodes)
-    np.testing.assert_array_equal(own["plus_end"][-1], state.monomers[:, 1])
-    np.testing.assert_allclose(own["length_nm"][-1], state.lengths._value)
-    with open(path, newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert [row["step"] for row in rows] == [str(50 * k) for k in (1, 2, 3, 4) for _ in (0, 1)]
-    assert [row["filament"] for row in rows] == 4 * ["0", "1"]
-    assert float(rows[-1]["concentration_micromolar"]) == pytest.approx(50.0)
-    for end, monomers in (("minus", -state.monomers[1, 0]), ("plus", state.monomers[1, 1] - 80)):
-        assert int(rows[-1][f"{end}_gained"]) - int(rows[-1][f"{end}_lost"]) == monomers
-    total = energies["stretching_energy"][-1] + energies["bending_energy"][-1]
-    assert total.sum() == pytest.approx(energy_of(simulation.context), rel=1e-9)
-    found = filaments.in_context(simulation.context).mean_axial_tensions()
-    np.testing.assert_allclose(tensions["mean_tension"][-1], [own._value.mean() for own in found])
-    assert [len(own) for own in found] == [*(state.nodes - 2), 3]
-    with pytest.raises(InputError, match="no growth to report"):
-        GrowthReporter(None, 1, built(growing(0, still=1))[0])
-
-
 def test_steps_that_resolve_how_ends_push():
     filaments, system, _ = built(growing())
     rate = ACTIN_ATP.plus_on_rate * filaments[0].growth.pool.concentration
@@ -456,6 +424,20 @@ def test_the_shortest_segment_at_an_end_counts_for_steps():
         filaments.add_straight(kind, segments, [0, 0, 0], [1, 0, 0], growth=own)
         steps.append(filaments.recommended_time_step().allowed["rotation"])
     assert steps[0] == pytest.approx(steps[1])
+
+
+def test_filaments_become_longer_than_longest_by_less_than_two_segments():
+    """As many nodes as it has in the worst places of its joints, which others need less of."""
+    for per_segment in (4, 7, 40):
+        kind = F_ACTIN.with_segment_length(per_segment * 2.7)
+        for monomers in range(per_segment, 5 * per_segment):
+            nodes = growth(longest=2.7 * monomers - 1e-9).count_nodes(kind)
+            ends = np.arange(per_segment)[:, None] + np.array([0, 1])
+            needed = [
+                count_nodes_of_monomers(ends + [0, many - 1], per_segment)
+                for many in range(monomers, monomers + 2 * per_segment)
+            ]
+            assert needed[0].max() == nodes and needed[-1].min() > nodes
 
 
 def test_places_of_linkers_on_what_has_grown():

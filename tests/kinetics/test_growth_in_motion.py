@@ -90,6 +90,32 @@ def test_free_ends_keep_their_rates_and_the_equilibrium_of_filaments(millisecond
     mean_within(bends, 1.0, 0.05)
 
 
+@pytest.mark.parametrize("segments, rate", [(2, 5e3), (4, 600.0)])
+def test_seeds_keep_their_equilibrium_at_the_recommended_step(segments, rate):
+    """It is far longer than the relaxation of a seed: that of the longest filament counts."""
+    filaments, still = (Filaments(1e-3 * unit.pascal * unit.second, TEMPERATURE) for _ in range(2))
+    for number in range(400):
+        own = growth((rate, rate), (rate, rate), longest=4.0 * unit.micrometer)
+        filaments.add_equilibrium(ACTIN, segments, number, growth=own)
+    still.add_equilibrium(ACTIN, segments, 0)
+    step = filaments.recommended_time_step().step
+    assert step > 10.0 * 20.0 * still.recommended_time_step().allowed["relaxation"]
+    assert step == pytest.approx(still.recommended_time_step().allowed["rotation"], rel=0.3)
+    topology, system, positions = filaments.build()
+    context, integrator = simulate(filaments, system, positions, step)
+    force, lengths, bends = chain_force(system), [], []
+    for _ in range(60):
+        integrator.step(2)
+        stretching, bending = force.computeEnergies(context)
+        nodes = filaments.in_context(context).growth().nodes
+        lengths.append(stretching._value / KT / (nodes - 1).sum())
+        bends.append(bending._value / KT / (nodes - 2).sum())
+    mean_within(lengths, 0.5, 0.05)
+    mean_within(bends, 1.0, 0.05)
+    assert filaments.in_context(context).growth().gained.sum() > 1000
+    assert integrator.getNumDividedSteps() < 400 * 120 * 1e-3
+
+
 def test_spare_nodes_are_where_the_last_node_is():
     filaments = Filaments(1e-3 * unit.pascal * unit.second, TEMPERATURE)
     for number in range(5):

@@ -14,6 +14,7 @@ from openmm_cylchain import (
     F_ACTIN,
     Filaments,
     Growth,
+    GrowthReporter,
     InputError,
     MonomerPool,
     Monomers,
@@ -204,9 +205,12 @@ def test_run_says_how_far_filaments_have_grown(directory, capsys):
     np.testing.assert_allclose(last["length (nm)"], growth.lengths._value, rtol=1e-12)
     np.testing.assert_allclose(last["free monomers (uM)"], 1e6 * growth.concentrations._value, rtol=1e-12)
     for end, which in enumerate(("minus", "plus")):
-        for what in ("gained", "lost", "waited"):
-            np.testing.assert_array_equal(last[f"{what} at the {which} end"], getattr(growth, what)[:, end])
-        moved = (last[f"gained at the {which} end"] - last[f"lost at the {which} end"]) * (1, -1)[which == "minus"]
+        names = {"gained": "gained (monomers)", "lost": "lost (monomers)"}
+        for what in ("gained", "lost", "waited", "shrinking", "catastrophes", "rescues"):
+            found = last[f"{which} end {names.get(what, what)}"]
+            np.testing.assert_array_equal(found, getattr(growth, what)[:, end])
+        gained = last[f"{which} end gained (monomers)"] - last[f"{which} end lost (monomers)"]
+        moved = gained * (1, -1)[which == "minus"]
         first = table[f"{which} end (monomers)"][0]
         np.testing.assert_array_equal(last[f"{which} end (monomers)"], first + moved)
     # The box holds less monomers by those that filaments have.
@@ -222,7 +226,11 @@ def test_a_run_reporter_writes_the_same(directory, tmp_path):
     simulation, built = create_simulation(configuration)
     begin(configuration, simulation, built)
     simulation.reporters.append(RunReporter(tmp_path / "out", 50, built.filaments))
+    simulation.reporters.append(GrowthReporter(tmp_path / "growth.csv", 50, built.filaments))
     simulation.step(500)
+    header, *lines = (tmp_path / "growth.csv").read_text().splitlines()
+    assert header in (directory / "growth.csv").read_text() and len(lines) == 60
+    assert set(lines) < set((directory / "growth.csv").read_text().splitlines())
     for name in ("growth.csv", "energies.csv"):
         text = (tmp_path / "out" / name).read_text()
         assert (directory / name).read_text().startswith(text) and text.count("\n") > 10, name

@@ -1,5 +1,6 @@
 """Forces that ask for an entry of every particle: filaments join them and change nothing else, or they are refused."""
 
+import itertools
 import re
 
 import numpy as np
@@ -7,7 +8,7 @@ import openmm
 import pytest
 from openmm import app
 
-from openmm_cylchain import DSDNA, Filaments, InputError
+from openmm_cylchain import ACTIN_ATP, DSDNA, F_ACTIN, Filaments, Growth, InputError
 from support.contexts import new_context
 from support.solvent import VISCOSITY
 
@@ -291,3 +292,51 @@ def test_a_name_that_is_taken_is_not_taken_again(reference):
         return force
 
     assert_nothing_changes(make, reference)
+
+
+def made_vdw():
+    force = openmm.AmoebaVdwForce()
+    force.addParticle(0, 0.3, 0.2, 1.0)
+    force.setParticleExclusions(0, [0])
+    return force
+
+
+def pair_of(index, force, name):
+    return tuple(sorted(getattr(force, name)(index)[:2]))
+
+
+@pytest.mark.parametrize(
+    ("make", "excluded"),
+    [
+        (
+            openmm.NonbondedForce,
+            lambda f: [pair_of(i, f, "getExceptionParameters") for i in range(f.getNumExceptions())],
+        ),
+        (
+            lambda: openmm.CustomNonbondedForce("1/r"),
+            lambda f: [pair_of(i, f, "getExclusionParticles") for i in range(f.getNumExclusions())],
+        ),
+        (openmm.CustomGBForce, lambda f: [pair_of(i, f, "getExclusionParticles") for i in range(f.getNumExclusions())]),
+        (
+            made_vdw,
+            lambda f: [(i, j) for i in range(f.getNumParticles()) for j in f.getParticleExclusions(i) if i < j],
+        ),
+    ],
+)
+def test_all_pairs_of_nodes_that_may_be_spare_are_excluded_once(make, excluded):
+    force, topology, system, filaments = make(), app.Topology(), openmm.System(), Filaments(VISCOSITY, 298.0)
+    growth = Growth(monomers=ACTIN_ATP, pool=0.0, longest=600.0)
+    for number, own in enumerate((growth, growth, None)):
+        kind = F_ACTIN.with_segment_length(54.0)
+        filaments.add_straight(kind, 4, [0, 30 * number, 0], [1, 0, 0], growth=own)
+    topology.addAtom("A", None, topology.addResidue("A", topology.addChain()))
+    system.addParticle(10.0)
+    if force.getNumParticles() == 0:
+        force.addParticle(*([1.0, 1.0, 1.0] if make is openmm.NonbondedForce else [[]]))
+    system.addForce(force)
+    filaments.add_to(topology, system, [[0, 50, 0]])
+    expected = [pair for own in filaments.node_indices[:2] for pair in itertools.combinations(own[1:].tolist(), 2)]
+    assert len(expected) == 2 * 66 and sorted(excluded(force)) == sorted(expected)
+    if make is openmm.NonbondedForce:
+        parameters = [force.getExceptionParameters(index)[2:] for index in range(force.getNumExceptions())]
+        assert all((own[0]._value, own[2]._value) == (0.0, 0.0) for own in parameters)
