@@ -38,10 +38,12 @@ from .errors import (
     TimeStepWarning,
 )
 from .filaments.attachments import Attachment
+from .filaments.end_states import DynamicInstability, EndStates, TwoUnitCap
 from .filaments.filament import Filament, Tether
 from .filaments.filament_type import FilamentType
-from .filaments.growth import DynamicInstability, Growth, MonomerPool, Monomers
-from .filaments.presets import ACTIN_ATP, DSDNA, F_ACTIN, MICROTUBULE, TUBULIN
+from .filaments.growth import Growth, MonomerPool, Monomers, MonomerState, Severing
+from .filaments.nucleation import Nucleation
+from .filaments.presets import ACTIN_AGING, ACTIN_ATP, DSDNA, F_ACTIN, MICROTUBULE, TUBULIN
 from .filaments.segment_place import SegmentPlace
 from .filaments.shapes import FilamentOptions
 from .kinetics.crosslinker import Crosslinker
@@ -66,6 +68,12 @@ from .time_steps.time_step import TimeStep, effective_rate
 from .version import __version__
 
 __all__ = [
+    "TwoUnitCap",
+    "Severing",
+    "Nucleation",
+    "MonomerState",
+    "EndStates",
+    "ACTIN_AGING",
     "ACTIN_ATP",
     "ALPHA_ACTININ",
     "Attachment",

@@ -109,12 +109,12 @@ class CompiledEngine(Engine):
         for tether in placed.tethers:
             force.addTether(tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
         system.addForce(force)
+        box = None
+        if placed.periodic:
+            box = np.array([vector._value for vector in system.getDefaultPeriodicBoxVectors()])
         if any(filament.growth is not None for filament in placed.filaments):
-            system.addForce(make_growth_force(placed.filaments, placed.viscosity, placed.temperature))
+            system.addForce(make_growth_force(placed.filaments, placed.viscosity, placed.temperature, box))
         if placed.linkers:
-            box = None
-            if placed.periodic:
-                box = np.array([vector._value for vector in system.getDefaultPeriodicBoxVectors()])
             linkers, filaments = placed.linkers, placed.filaments
             system.addForce(make_binding_force(linkers, filaments, placed.temperature, placed.positions, box))
 

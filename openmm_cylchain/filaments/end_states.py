@@ -87,7 +87,9 @@ class EndStates:
         object.__setattr__(self, "switch_rates", switches)
         for name in ("after_gain", "after_loss"):
             after = tuple(getattr(self, name)) or tuple(range(count))
-            if len(after) != count or not all(isinstance(state, (int, np.integer)) and 0 <= state < count for state in after):
+            if len(after) != count or not all(
+                isinstance(state, (int, np.integer)) and 0 <= state < count for state in after
+            ):
                 raise InputError(f"{name} must have a number of a state, from 0 to {count - 1}, for each of {count}.")
             object.__setattr__(self, name, tuple(int(state) for state in after))
         names = tuple(self.names) or tuple(map(str, range(count)))

@@ -25,6 +25,7 @@ from ..units.quantities import (
 from ..units.types import FloatArray
 from .chain_type import Chain, ChainType
 from .growth import Growth
+from .nucleation import Nucleation
 from .placement import joint_stiffnesses
 
 NODE_NAME = "NOD"
@@ -60,6 +61,10 @@ class Filament:
         How it grows, if it does.
     spare_nodes : int
         How many particles it has besides its nodes, which become nodes as it grows.
+    is_reserve : bool
+        It has not begun yet: both of its nodes are in one place, which is no place of a filament.
+    nucleation : Nucleation or None
+        How those that have not begun do so, if not as a part of one that is cut.
     """
 
     type: ChainType
@@ -72,6 +77,8 @@ class Filament:
     clamped_tangents: tuple[int, ...] = ()
     growth: Growth | None = None
     spare_nodes: int = 0
+    is_reserve: bool = False
+    nucleation: Nucleation | None = None
 
     def __post_init__(self) -> None:
         require_kind(self.type, ChainType, "Filament: type")

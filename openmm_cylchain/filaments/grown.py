@@ -13,14 +13,15 @@ from .growth import segment_of_length
 
 
 def count_nodes_of_monomers(monomers: IntArray, per_segment: IntArray | int) -> IntArray:
-    """How many nodes filaments have with the monomers (..., 2) from a first one to before another.
+    """How many nodes filaments have with the monomers (..., 2) from a first one to before another; none without any.
 
     Joints are at multiples of the monomers of a segment, with half of these or more beyond the last joint at an end.
     """
     least = np.asarray(per_segment) // 2
     first = -((-(monomers[..., 0] + least)) // per_segment)
     last = (monomers[..., 1] - least) // per_segment
-    return np.maximum(0, last - first + 1) + 2
+    nodes: IntArray = np.where(monomers[..., 0] == monomers[..., 1], 0, np.maximum(0, last - first + 1) + 2)
+    return nodes
 
 
 def monomers_of_segments(monomers: IntArray, per_segment: int) -> IntArray:

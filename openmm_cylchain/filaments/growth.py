@@ -20,6 +20,7 @@ from ..units.quantities import (
     non_negative,
     positive,
     require_kind,
+    shown,
     true_or_false,
 )
 from ..units.types import FloatArray, Indices, Scalar
@@ -327,7 +328,11 @@ class Growth:
         for end in ("plus", "minus"):
             instability = getattr(self, f"{end}_instability")
             if instability is not None:
-                require_kind(instability, (DynamicInstability, TwoUnitCap, EndStates), f"{end}_instability")
+                if not isinstance(instability, (DynamicInstability, TwoUnitCap, EndStates)):
+                    raise InputError(
+                        f"{end}_instability must be a DynamicInstability, a TwoUnitCap or EndStates, but is "
+                        f"{shown(instability)}."
+                    )
                 if self.monomers.aging:
                     raise InputError(
                         f"Monomers that age decide what ends do: leave {end}_instability, or their aging, out."
@@ -363,10 +368,6 @@ class Growth:
         none = (0.0,) * len(states.names)
         return replace(states, on_rates=none, off_rates=none)
 
-    def rate_at_concentration(self, end: str) -> float:
-        """How many monomers a free end gains less those it loses, in 1/ps, at the concentration of its pool."""
-        return self.states(end).net_rate(self.pool.concentration)
-
     def monomers_per_segment(self, filament_type: FilamentType) -> int:
         """The monomers of a segment; InputError if they are not a whole number from 2 on."""
         ratio = filament_type.segment_length / self.monomers.length
@@ -395,9 +396,12 @@ class Growth:
 
 
 def check_growth(
-    growth: Growth, filament_type: ChainType, segments: int, closed: bool, clamped: Indices, label: str
+    growth: Growth, filament_type: ChainType, segments: int | None, closed: bool, clamped: Indices, label: str
 ) -> int:
-    """The number of spare nodes of a filament that grows; InputError if it cannot."""
+    """The number of spare nodes of a filament that grows, or of all its nodes if it has no segments yet (None).
+
+    InputError if it cannot.
+    """
     require_kind(growth, Growth, f"{label}: growth")
     if not (isinstance(filament_type, FilamentType) and filament_type.segment_kind.straight) or closed:
         raise InputError(f"{label}: only open filaments of straight segments grow.")
@@ -415,6 +419,10 @@ def check_growth(
         _shortest_segment(filament_type, growth, min(fewest, per_segment // 2))
     except InputError as error:
         raise InputError(f"{label}: {error}") from None
+    if segments is None:
+        return growth.count_nodes(filament_type)
+    if growth.vanishes and tuple(clamped):
+        raise InputError(f"{label} vanishes when it is short, so none of its nodes may be clamped.")
     length = segments * filament_type.segment_length
     if segments * per_segment < fewest or length > growth.longest * (1.0 + _SAME_LENGTH):
         raise InputError(

@@ -1,9 +1,11 @@
 """Filament types of actin, DNA and microtubules, and what they grow of."""
 
+from dataclasses import replace
+
 from openmm import unit
 
 from .filament_type import FilamentType
-from .growth import Monomers
+from .growth import Monomers, MonomerState
 
 _PICONEWTON = unit.piconewton
 _PER_AMOUNT = unit.liter / unit.mole / unit.second
@@ -79,6 +81,24 @@ ACTIN_ATP = Monomers(
 """ATP-actin: Pollard, J. Cell Biol. 1986, 103, 2747: plus end 11.6 /uM/s and 1.4 /s, minus end 1.3 /uM/s and 0.8 /s.
 
 A filament grows by 2.7 nm with a monomer (Holmes et al., Nature 1990, 347, 44). Nucleotides are not told apart.
+"""
+
+ACTIN_AGING = replace(
+    ACTIN_ATP,
+    aging=(
+        MonomerState(
+            name="ADP-Pi", rate=0.3 / unit.second, plus_off_rate=0.2 / unit.second, minus_off_rate=0.02 / unit.second
+        ),
+        MonomerState(
+            name="ADP", rate=0.0026 / unit.second, plus_off_rate=5.4 / unit.second, minus_off_rate=0.25 / unit.second
+        ),
+    ),
+)
+"""Actin whose monomers hydrolyse ATP and release phosphate at random, and dissociate as what they are at an end.
+
+New ones have the rates of ACTIN_ATP; k_off of ADP-Pi 0.2 and 0.02 per s at the plus and minus end, and of ADP 5.4 and
+0.25 per s (Fujiwara, Vavylonis and Pollard, Proc. Natl. Acad. Sci. 2007, 104, 8827). Hydrolysis at 0.3 per s (Blanchoin
+and Pollard, Biochemistry 2002, 41, 597), phosphate at 0.0026 per s (Carlier and Pantaloni, Biochemistry 1986, 25, 7789).
 """
 
 TUBULIN = Monomers(

@@ -19,6 +19,7 @@ from ..units.types import Indices, Scalar, Vector, Vectors
 from .chain_type import ChainType, Points
 from .filament import Filament
 from .growth import Growth, check_growth
+from .nucleation import Nucleation
 from .placement import check_shape, in_one_plane, planar_direction
 
 MINIMUM_RING = 4
@@ -179,4 +180,28 @@ def new_filament(
         spare = check_growth(growth, filament_type, len(positions) - 1, closed, held, label)
     return Filament(
         filament_type, positions, held, closed, planar, propulsion, control_points, held_tangents, growth, spare
+    )
+
+
+def reserve_filament(
+    filament_type: ChainType,
+    label: str,
+    growth: Growth,
+    nucleation: Nucleation | None,
+    planar: bool,
+    propulsion: Scalar,
+) -> Filament:
+    """A Filament that has not begun yet."""
+    nodes = check_growth(growth, filament_type, None, False, (), label)
+    place = np.zeros(3) if nucleation is None else nucleation.centre
+    return Filament(
+        filament_type,
+        np.tile(place, (2, 1)),
+        (),
+        planar=true_or_false(planar, f"{label}: planar"),
+        propulsion=finite_number(propulsion, FORCE, f"{label}: propulsion"),
+        growth=growth,
+        spare_nodes=nodes - 2,
+        is_reserve=True,
+        nucleation=nucleation,
     )

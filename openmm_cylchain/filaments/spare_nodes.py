@@ -20,7 +20,7 @@ def count_nodes(positions: Vectors) -> IntArray:
     Returns
     -------
     (frames,) int array, without an axis for (n, 3)
-        At least 2.
+        0 where all of them are in one place: there is no filament.
 
     Raises
     ------
@@ -33,7 +33,7 @@ def count_nodes(positions: Vectors) -> IntArray:
     apart = np.any(places != places[..., -1:, :], axis=-1)
     # The last node is behind the last particle that is elsewhere.
     elsewhere = places.shape[-2] - np.argmax(apart[..., ::-1], axis=-1)
-    nodes: IntArray = np.where(apart.any(axis=-1), elsewhere + 1, 2)
+    nodes: IntArray = np.where(apart.any(axis=-1), elsewhere + 1, 0)
     return nodes
 
 

@@ -10,6 +10,7 @@ from openmm import unit
 
 from ..engine_choice import load_plugin
 from ..errors import InputError
+from ..filaments.end_states import SHRINKING
 from ..filaments.filament import Filament
 from ..filaments.filament_type import FilamentType
 from ..filaments.grown import count_nodes_of_monomers, rest_lengths
@@ -19,6 +20,7 @@ from ..units.types import BoolArray, FloatArray, IntArray
 from .first_places import contour_of
 
 GROWTH_FORCE_NAME = "Growth"
+ENDS = ("minus", "plus")
 _MOST_MONOMERS = 10**9
 
 
@@ -36,12 +38,15 @@ def find_growth_force(system: openmm.System) -> Any:
     return None
 
 
-def make_growth_force(filaments: Sequence[Filament], viscosity: float, temperature: float) -> openmm.Force:
-    """The force of the filaments that grow, which are chains of the same numbers."""
+def make_growth_force(
+    filaments: Sequence[Filament], viscosity: float, temperature: float, box: FloatArray | None
+) -> openmm.Force:
+    """The force of the filaments that grow, which are chains of the same numbers, in a periodic box (3, 3) or none."""
     force = load_plugin().CylinderChainGrowthForce()
     force.setName(GROWTH_FORCE_NAME)
     tables: dict[Any, int] = {}
     pools: dict[int, int] = {}
+    begin: dict[int, list[int]] = {}
     for number, filament in enumerate(filaments):
         growth, kind = filament.growth, filament.type
         if growth is None or not isinstance(kind, FilamentType):
@@ -54,21 +59,48 @@ def make_growth_force(filaments: Sequence[Filament], viscosity: float, temperatu
             tables[key] = force.addTable(per_segment, segments.ravel().tolist(), joints.tolist())
         if id(growth.pool) not in pools:
             pools[id(growth.pool)] = force.addPool(growth.pool.concentration, growth.pool.volume or 0.0)
-        force.addGrowingChain(
-            number,
-            tables[key],
-            pools[id(growth.pool)],
-            0,
-            per_segment * filament.segments,
-            growth.fewest_monomers(kind),
-            *growth.rates("minus"),
-            *growth.rates("plus"),
-        )
-        for end, name in enumerate(("minus", "plus")):
-            instability = growth.instability(name)
-            if instability is not None:
-                force.setDynamicInstability(force.getNumGrowingChains() - 1, end, *instability.rates)
+        monomers = 0 if filament.is_reserve else per_segment * filament.segments
+        least = growth.fewest_monomers(kind)
+        index = force.addGrowingChain(number, tables[key], pools[id(growth.pool)], 0, monomers, least, growth.vanishes)
+        _set_ends(force, index, growth)
+        if filament.nucleation is not None:
+            begin.setdefault(id(filament.nucleation), []).append(index)
+    growing = [filament for filament in filaments if filament.growth is not None]
+    for indices in begin.values():
+        _add_nucleator(force, growing[indices[0]], indices, box)
     return force
+
+
+def _set_ends(force, index, growth):
+    oldest = len(growth.monomers.aging)
+    states = [growth.states(end) for end in ENDS]
+    for end, own in enumerate(states):
+        rates = np.column_stack([own.on_rates, own.off_rates]).ravel()
+        after = np.column_stack([own.after_gain, own.after_loss]).ravel()
+        force.setEndStates(index, end, oldest, rates.tolist(), after.tolist(), np.ravel(own.switch_rates).tolist())
+    force.setMonomersHaveStates(index, oldest > 0)
+    severing = growth.severing
+    if severing is not None:
+        cut = [float(not severing.of_states or name in severing.of_states) for name in states[1].names]
+        shares = cut if oldest > 0 else []
+        plus_state = states[1].find(SHRINKING) if severing.shrinks else 0
+        force.setSevering(index, severing.rate * growth.monomers.length, 0, plus_state, shares)
+
+
+def _add_nucleator(force, filament, indices, box):
+    nucleation, growth = filament.nucleation, filament.growth
+    monomers = growth.fewest_monomers(filament.type)
+    if nucleation.length is not None:
+        monomers = round(nucleation.length / growth.monomers.length)
+    direction = np.zeros(3) if nucleation.direction is None else nucleation.direction
+    force.addNucleator(
+        nucleation.whole_rate(box),
+        nucleation.order,
+        monomers,
+        *nucleation.described_region,
+        openmm.Vec3(*direction),
+        indices,
+    )
 
 
 @dataclass(frozen=True)
@@ -81,7 +113,7 @@ class FilamentGrowth:
         The numbers of those that grow.
     monomers : (n, 2) int array
         The number of the first monomer, at the minus end, and that behind the last one. They begin at zero, so a
-        filament has gone where its numbers have: a treadmilling one forwards.
+        filament has gone where its numbers have: a treadmilling one forwards. Both are zero if there is none now.
     lengths : (n,) Quantity in nm
         At rest.
     nodes : (n,) int array
@@ -89,12 +121,20 @@ class FilamentGrowth:
     gained, lost, waited : (n, 2) int arrays
         How many monomers each end, minus and plus, has gained and lost since the start, and how often it would have
         gained one, but had no spare node.
+    end_states : (n, 2) int array
+        The number of the state of each end among ``EndStates.names``.
     shrinking : (n, 2) bool array
         Whether each end shrinks now, of those with dynamic instability.
     catastrophes, rescues : (n, 2) int arrays
-        How often each end has begun to shrink, and to grow again.
+        How often each end has begun to shrink, and to grow again: has changed by itself to the first of its states.
     concentrations : (n,) Quantity in mol/l
         Of free monomers in the pool of each.
+    identities, parents : (n,) int arrays
+        Which of all filaments that have ever grown each one is, counted from zero, and of which it was a part when that
+        was cut; -1 for none.
+    nucleated, vanished, severed, without_place : int
+        How many filaments have begun, vanished, and were cut, and how often one would have begun or been cut, but there
+        was no place left (``Filaments.add_reserve``).
     """
 
     filaments: IntArray
@@ -104,40 +144,66 @@ class FilamentGrowth:
     gained: IntArray
     lost: IntArray
     waited: IntArray
+    end_states: IntArray
     shrinking: BoolArray
     catastrophes: IntArray
     rescues: IntArray
     concentrations: unit.Quantity
+    identities: IntArray
+    parents: IntArray
+    nucleated: int
+    vanished: int
+    severed: int
+    without_place: int
 
 
 def growth_of(context: openmm.Context, filaments: Sequence[Filament]) -> FilamentGrowth:
     """How far filaments have grown in a Context of their System."""
     force = find_growth_force(context.getSystem())
-    ends, shrinks, events, densities = force.getGrowthInContext(context)
-    monomers, counts = np.array(ends).reshape(-1, 2), np.array(events).reshape(-1, 2, 5).astype(int)
-    numbers, pools = [], []
-    for index in range(len(monomers)):
-        number, _, pool, *_ = force.getGrowingChainParameters(index)
-        numbers.append(number)
-        pools.append(pool)
-    per_monomer = np.array([filaments[number].growth.monomers.length for number in numbers])
-    per_segment = np.array(
-        [filaments[number].growth.monomers_per_segment(filaments[number].type) for number in numbers]
-    )
-    molar = np.array(densities)[pools] / AVOGADRO
+    ends, states, events, densities = force.getGrowthInContext(context)
+    lineages, population = force.getPopulationInContext(context)
+    monomers, end_states = np.array(ends).reshape(-1, 2), np.array(states, dtype=int).reshape(-1, 2)
+    chains = [force.getGrowingChainParameters(index) for index in range(len(monomers))]
+    own = [filaments[number] for number, *_ in chains]
+    counts = _counts_of_ends([filament.growth for filament in own], end_states, events)
+    per_monomer = np.array([filament.growth.monomers.length for filament in own])
+    per_segment = np.array([filament.growth.monomers_per_segment(filament.type) for filament in own])
+    molar = np.array(densities)[[pool for _, _, pool, *_ in chains]] / AVOGADRO
+    identities, parents = np.array(lineages, dtype=int).reshape(-1, 2).T
     return FilamentGrowth(
-        np.array(numbers),
+        np.array([number for number, *_ in chains]),
         monomers,
         (monomers[:, 1] - monomers[:, 0]) * per_monomer * LENGTH,
         count_nodes_of_monomers(monomers, per_segment),
         counts[:, :, 0],
         counts[:, :, 1],
         counts[:, :, 2],
-        np.array(shrinks, dtype=bool).reshape(-1, 2),
-        counts[:, :, 3],
+        end_states,
+        counts[:, :, 3].astype(bool),
         counts[:, :, 4],
+        counts[:, :, 5],
         unit.Quantity(molar, NUMBER_DENSITY * unit.mole).in_units_of(unit.molar),
+        identities,
+        parents,
+        *map(int, population),
     )
+
+
+def _counts_of_ends(growths, end_states, events):
+    # Gained, lost, waited, whether it shrinks, catastrophes and rescues of each end: (n, 2, 6).
+    counts = np.zeros((len(growths), 2, 6), dtype=int)
+    names: dict[tuple[int, str], tuple[str, ...]] = {}
+    position = 0
+    for index, growth in enumerate(growths):
+        for end, name in enumerate(ENDS):
+            own = names.setdefault((id(growth), name), growth.states(name).names)
+            counts[index, end, :3] = events[position : position + 3]
+            if SHRINKING in own:
+                entered = events[position + 3 : position + 3 + len(own)]
+                shrinks = own[end_states[index, end]] == SHRINKING
+                counts[index, end, 3:] = shrinks, entered[own.index(SHRINKING)], entered[0]
+            position += 3 + len(own)
+    return counts
 
 
 def set_growth_of(context: openmm.Context, filaments: Sequence[Filament], monomers: Any) -> None:
@@ -153,6 +219,8 @@ def set_growth_of(context: openmm.Context, filaments: Sequence[Filament], monome
     for number, (first, last) in zip(numbers, ends.tolist()):
         own = filaments[number]
         fewest = own.growth.fewest_monomers(own.type)
+        if first == last == 0 and (own.growth.vanishes or own.is_reserve):
+            continue
         label = f"Filament {number} ({own.type.name}) cannot have the monomers from {first} to before {last}"
         if last - first < fewest or max(abs(first), abs(last)) >= _MOST_MONOMERS:
             raise InputError(f"{label}: it has {fewest} monomers at least, with numbers below {_MOST_MONOMERS:.0e}.")
@@ -176,6 +244,9 @@ def contours_in(context: openmm.Context, filaments: Sequence[Filament]) -> list[
     for number, monomers in zip(present.filaments, present.monomers):
         filament = filaments[number]
         length = filament.growth.monomers.length
+        if monomers[0] == monomers[1]:
+            contours[number] = np.zeros(1)
+            continue
         rest = rest_lengths(monomers, filament.growth.monomers_per_segment(filament.type), length)
         contours[number] = monomers[0] * length + np.concatenate([[0.0], np.cumsum(rest)])
     return contours

@@ -64,7 +64,7 @@ def _growth_of(group):
     gains = [
         f"{free_rate(growth, end, concentration):+.3g} monomers/s at the {end} end"
         for end in ENDS
-        if any(growth.rates(end))
+        if growth.states(end).grows
     ]
     nodes = f"{_counted(group.spare_nodes, 'spare node')} each, for a length of {growth.longest:g} nm"
     return f"{' and '.join(gains)}, where it is free, at {concentration:.4g} uM; {nodes}"

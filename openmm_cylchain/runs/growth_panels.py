@@ -52,7 +52,7 @@ def _draw_ends(axis, times, unit_of_time, table, configuration, members, colours
     for group, numbers, label in groups:
         concentration = table.column("free monomers (uM)", numbers).mean(axis=1)
         for end, line, sign in (("plus", "-", 1.0), ("minus", ":", -1.0)):
-            if not any(group.growth.rates(end)):
+            if not group.growth.states(end).grows:
                 continue
             axis.plot(
                 times, places[id(group)][end] / scale, line, color=colours[id(group)], label=f"{label}, {end} ends"

@@ -67,18 +67,11 @@ def growing_groups(configuration, members):
 
 
 def free_rate(growth, end, concentration):
-    """k_on c - k_off in 1/s of a "plus" or "minus" end, at a concentration in umol/l.
+    """What a free "plus" or "minus" end gains less what it loses, in 1/s, at a concentration in umol/l.
 
-    Of dynamic instability, the mean over the times that the end grows and shrinks.
+    Of one with several states, the mean over those that it has in the long run.
     """
-    on, off = growth.rates(end)
-    rate = on * concentration * MICROMOLAR - off
-    turning = growth.instability(end)
-    if turning is not None and turning.catastrophe_rate + turning.rescue_rate > 0.0:
-        shrinking = turning.shrinking_on_rate * concentration * MICROMOLAR - turning.shrinking_off_rate
-        both = turning.catastrophe_rate + turning.rescue_rate
-        rate = (rate * turning.rescue_rate + shrinking * turning.catastrophe_rate) / both
-    return rate * _SECOND
+    return growth.states(end).net_rate(concentration * MICROMOLAR) * _SECOND
 
 
 def summarise_growth(configuration, members, directory):
@@ -89,7 +82,7 @@ def summarise_growth(configuration, members, directory):
         _summarise(table, group.growth, numbers, label, end)
         for group, numbers, label in groups
         for end in ENDS
-        if any(group.growth.rates(end))
+        if group.growth.states(end).grows
     ]
 
 

@@ -200,7 +200,7 @@ def _add(filaments, group, nodes, control_points, kinetics):
     growth = group.growth
     if growth is not None and not kinetics:
         still = Monomers(length=growth.monomers.length)
-        growth = replace(growth, monomers=still, plus_instability=None, minus_instability=None)
+        growth = replace(growth, monomers=still, plus_instability=None, minus_instability=None, severing=None)
     filaments.add_nodes(
         group.type,
         nodes,

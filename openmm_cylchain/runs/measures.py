@@ -208,7 +208,7 @@ def _of_growth(configuration, run):
     yield GROWN, found
     sizes = np.concatenate([np.full(group.count, group.growth.monomers.length) for group in growing])
     for end, name in GROWTH.items():
-        if len(lengths[late]) > 2 and any(any(group.growth.rates(end)) for group in growing):
+        if len(lengths[late]) > 2 and any(group.growth.states(end).grows for group in growing):
             steps = np.diff(table.times[late])[:, None] / _SECOND
             mean, error = mean_over_filaments(np.diff(table.ends(end)[late], axis=0) * sizes / steps)
             yield name, {"mean": mean, "standard_error": error}

@@ -13,6 +13,8 @@ from ..errors import InputError
 from ..filaments import shapes
 from ..filaments.chain_type import ChainType
 from ..filaments.filament import Filament
+from ..filaments.growth import Growth
+from ..filaments.nucleation import Nucleation, require_nucleation
 from ..filaments.shapes import FilamentOptions
 from ..units.quantities import TEMPERATURE, VISCOSITY, non_negative, positive, shown, whole_number
 from ..units.types import IntArray, Scalar, Vector, Vectors
@@ -227,6 +229,56 @@ class AddedFilaments:
             filament_type, segments, self._temperature, generator, start, direction, clamped, planar, label
         )
         return self._add(filament_type, points, label, False, options)
+
+    def add_reserve(
+        self,
+        filament_type: ChainType,
+        count: int,
+        *,
+        growth: Growth,
+        nucleation: Nucleation | None = None,
+        planar: bool = False,
+        propulsion: Scalar = 0.0,
+    ) -> range:
+        """Add filaments that are not there yet: they begin by nucleation, or as parts of filaments that are cut.
+
+        A System cannot get more particles while it runs, so filaments that come need places. All of their particles are
+        in one place until then, and where they vanished afterwards. Those that are cut take any place of the same type
+        and growth.
+
+        Parameters
+        ----------
+        filament_type : FilamentType
+        count : int
+            How many there can be at once, besides others.
+        growth : Growth
+            With ``vanishes=True``, filaments give their place back.
+        nucleation : Nucleation, optional
+            How they begin; only as parts if not given.
+        planar, propulsion
+            See ``FilamentOptions``.
+
+        Returns
+        -------
+        range
+            Their numbers.
+
+        Raises
+        ------
+        InputError
+            If the engine has no filaments that grow, or something is not what it should be.
+        """
+        label = f"Reserve {self._label(filament_type)}"
+        self._refuse_if_built(label)
+        if not self._engine.has_growth:
+            raise InputError(
+                f"{label}: the {self._engine_name} engine has no filaments that grow: use the compiled one."
+            )
+        require_nucleation(nucleation)
+        filament = shapes.reserve_filament(filament_type, label, growth, nucleation, planar, propulsion)
+        first = len(self)
+        self._filaments += [filament] * whole_number(count, 1, f"{label}: count")
+        return range(first, len(self))
 
     def _refuse_if_built(self, label):
         if self._nodes is not None:

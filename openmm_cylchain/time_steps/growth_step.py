@@ -88,7 +88,11 @@ def _fastest_end(filaments, system):
     grows = [(number, own) for number, own in enumerate(filaments) if own.growth is not None]
     if not grows or not any(_may_be_pushed(force) for force in system.getForces()):
         return "", 0.0
-    rates = [(_rates(own, end)[0], f"the {end} end of filament {i}") for i, own in grows for end in ("plus", "minus")]
+    rates = [
+        (own.growth.states(end).most_gained(own.growth.pool.concentration), f"the {end} end of filament {i}")
+        for i, own in grows
+        for end in ("plus", "minus")
+    ]
     rate, label = max(rates, key=lambda one: one[0])
     return label, rate
 
@@ -98,19 +102,8 @@ def _may_be_pushed(force):
 
 
 def _events(filament, end):
-    # How many come to an end in 1/ps while it grows, or while it shrinks if that is more.
-    on_rate, off_rate = _rates(filament, end)
-    instability = None if filament.growth is None else filament.growth.instability(end)
-    if instability is None:
-        return on_rate + off_rate
-    back_rate, loss_rate, catastrophe_rate, rescue_rate = instability.rates
-    shrinking = back_rate * filament.growth.pool.concentration + loss_rate + rescue_rate
-    return max(on_rate + off_rate + catastrophe_rate, shrinking)
-
-
-def _rates(filament, end):
-    # Of monomers that come and that go, in 1/ps.
+    # How many come to an end in 1/ps, in the state in which they are most.
     if filament.growth is None:
-        return 0.0, 0.0
-    on_rate, off_rate = filament.growth.rates(end)
-    return on_rate * filament.growth.pool.concentration, off_rate
+        return 0.0
+    busiest: float = filament.growth.states(end).busiest_rate(filament.growth.pool.concentration)
+    return busiest

@@ -74,6 +74,31 @@ const double LEAST_CHANGE = 1e-5;
 /** The resistance of a node to its motion. Third powers of it are computed, also for a thousandth of a step. */
 const double LEAST_RESISTANCE = 1e-9, LARGEST_RESISTANCE = 1e8;
 
+/** Find the friction of a chain against turning if it were straight. */
+double frictionOfTurning(const Chain& chain) {
+    double length = 0, centre = 0, friction = 0, weight = 0;
+    for (const Segment& segment : chain.segments) {
+        const double middle = length+0.5*segment.restLength;
+        centre += segment.perpendicular*middle;
+        weight += segment.perpendicular;
+        length += segment.restLength;
+    }
+    centre /= weight;
+    length = 0;
+    for (const Segment& segment : chain.segments) {
+        const double arm = length+0.5*segment.restLength-centre;
+        friction += segment.rotational+segment.perpendicular*arm*arm;
+        length += segment.restLength;
+    }
+    return friction;
+}
+
+/** Whether a chain turns as a rod does: its segments have friction, and nothing holds it. */
+bool turnsFreely(const Chain& chain) {
+    return !chain.closed && isAngular(chain.bending) && hasSegmentFriction(chain) && chain.tethers.empty() &&
+            none_of(chain.fixed.begin(), chain.fixed.end(), [] (bool fixed) {return fixed;});
+}
+
 void fillLane(ChainPack<double>& pack, PropertyRows<double>& properties, int lane, const Chain& chain, int index) {
     typedef ChainPack<double> Pack;
     const size_t own = chain.nodes.size(), unrolled = own+(chain.closed ? 2 : 0);
@@ -81,6 +106,7 @@ void fillLane(ChainPack<double>& pack, PropertyRows<double>& properties, int lan
     for (size_t node = 0; node < unrolled; node++)
         properties.at(node, Pack::Mobile)[lane] = chain.fixed[node%own] ? 0 : 1;
     pack.free[lane] = any_of(chain.fixed.begin(), chain.fixed.end(), [] (bool fixed) {return fixed;}) ? 0.0 : 1.0;
+    pack.turning[lane] = turnsFreely(chain) ? 1/frictionOfTurning(chain) : 0;
     pack.nodeFriction[lane] = chain.nodeFriction;
     pack.rootNodeFriction[lane] = sqrt(chain.nodeFriction);
     for (size_t node = 1; node < unrolled-1; node++)
@@ -93,6 +119,7 @@ void fillLane(ChainPack<double>& pack, PropertyRows<double>& properties, int lan
 template <class Scalar> ChainPack<Scalar> packWithoutChains(const PackShape& shape, int lanes) {
     ChainPack<Scalar> pack = emptyPack<Scalar>(shape, lanes);
     pack.free.resize(lanes);
+    pack.turning.resize(lanes);
     pack.nodeFriction.resize(lanes);
     pack.rootNodeFriction.resize(lanes);
     return pack;
@@ -149,6 +176,7 @@ ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>
         copyTo(wide.particles, pack->particles);
         properties.setLanes(lane, *pack);
         copyTo(wide.free, pack->free);
+        copyTo(wide.turning, pack->turning);
         copyTo(wide.nodeFriction, pack->nodeFriction);
         copyTo(wide.rootNodeFriction, pack->rootNodeFriction);
         if (!pack->propulsions.empty())

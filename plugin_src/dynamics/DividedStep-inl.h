@@ -5,7 +5,21 @@
  */
 
 /** A step that does not converge is cut into at most two to this power. */
-const int LARGEST_DIVISION = 10;
+const int LARGEST_DIVISION = 16;
+/** The largest variance of an angle by which a chain may turn as a whole in a part of a step. */
+const double LARGEST_TURN = 0.2;
+
+/**
+ * Find into how many parts, two to this power, the step of a chain is cut from the start, because it turns too far in
+ * it. Where equations that are not solved alone decided, what is random would.
+ */
+inline int plannedDivision(const Pack& pack, const StepSettings& settings, int lane) {
+    double turn = settings.mayDivide ? 2*settings.kT*settings.stepSize*pack.turning[lane] : 0;
+    int division = 0;
+    for (; turn > LARGEST_TURN && division < LARGEST_DIVISION && settings.level+division < LARGEST_LEVEL; division++)
+        turn *= 0.5;
+    return division;
+}
 
 /** Means over the parts of a divided step, for the lanes whose step is divided. */
 template <int W> class MeanOfParts {
@@ -69,7 +83,7 @@ template <int W, bool CLOSED> int takeImplicitStep(const Pack& pack, const StepS
  */
 template <int W> void divideStep(TakeStep<W> takeStep, const Pack& pack, const StepStart<W>& start,
             const Vector<typename Lanes<W>::Type>* f, StepSettings settings, Vector<typename Lanes<W>::Type>* y,
-            bool* failed) {
+            bool* failed, const int* planned) {
     typedef typename Lanes<W>::Type Real;
     static thread_local Scratch vectors, tethers;
     const double h = settings.stepSize;
@@ -79,7 +93,14 @@ template <int W> void divideStep(TakeStep<W> takeStep, const Pack& pack, const S
     Vector<Real>* moved = vectors.reserve<Vector<Real> >(4*n);
     Vector<Real>* change = moved+n;
     const StepStart<W> from = {moved+2*n, moved+3*n, tethers.reserve<TetherVector>(pack.tethers.size())};
-    for (int division = 1; division <= LARGEST_DIVISION; division++) {
+    for (int division = 1; division <= LARGEST_DIVISION && level+division <= LARGEST_LEVEL; division++) {
+        bool isTried[W], anyIsTried = false;
+        for (int i = 0; i < W; i++) {
+            isTried[i] = failed[i] && division >= planned[i];
+            anyIsTried |= isTried[i];
+        }
+        if (!anyIsTried)
+            continue;
         const int parts = 1<<division;
         settings.stepSize = h/parts;
         settings.level = level+division;
@@ -93,16 +114,16 @@ template <int W> void divideStep(TakeStep<W> takeStep, const Pack& pack, const S
             takeStep(pack, settings, from, f, change, failedPart);
             for (int node = 0; node < n; node++)
                 moved[node] = moved[node]+change[node];
-            mean.add(part, parts, failed);
+            mean.add(part, parts, isTried);
             hope = false;
             for (int i = 0; i < W; i++) {
                 failedNow[i] |= failedPart[i];
-                hope |= failed[i] && !failedNow[i];
+                hope |= isTried[i] && !failedNow[i];
             }
         }
         bool any = false;
         for (int i = 0; i < W; i++) {
-            if (failed[i] && !failedNow[i]) {
+            if (isTried[i] && !failedNow[i]) {
                 failed[i] = false;
                 for (int node = 0; node < n; node++) {
                     lane(y[node].x, i) = lane(moved[node].x, i);
@@ -147,11 +168,24 @@ template <int W> Instability stepPackImplicitly(const Pack& pack, const double* 
     if (pack.closed)
         takeStep = takeImplicitStep<W, true>;
 #endif
-    result.iterations = takeStep(pack, settings, start, f, y, failed);
-    for (int i = 0; i < W; i++)
-        result.divided += failed[i];
-    if (result.divided > 0 && settings.mayDivide)
-        divideStep<W>(takeStep, pack, start, f, settings, y, failed);
+    int planned[W];
+    bool allArePlanned = true, any = false;
+    for (int i = 0; i < W; i++) {
+        planned[i] = plannedDivision(pack, settings, i);
+        allArePlanned &= planned[i] > 0 || pack.chain[i] < 0;
+    }
+    if (!allArePlanned)
+        result.iterations = takeStep(pack, settings, start, f, y, failed);
+    for (int i = 0; i < W; i++) {
+        if (allArePlanned)
+            failed[i] = pack.chain[i] >= 0;
+        else
+            result.divided += failed[i] && planned[i] == 0;
+        failed[i] |= planned[i] > 0;
+        any |= failed[i];
+    }
+    if (any && settings.mayDivide)
+        divideStep<W>(takeStep, pack, start, f, settings, y, failed, planned);
     scatter<W>(pack, y, 1, displacements);
     for (int i = 0; i < W; i++)
         if (failed[i] && result.chain < 0)

@@ -105,10 +105,10 @@ int ChainPopulation::nucleate(GrowthState& state, const GrowthStep& step, const 
     chains.set(index, nodes);
     state.ranges[index] = range;
     returnMonomers(state, index, -nucleator.monomers);
-    for (int end : {0, 1})
-        state.endStates[2*index+end] = own.ends[end].initialState;
+    // Its monomers are new.
+    state.endStates[2*index] = state.endStates[2*index+1] = 0;
     if (own.monomersHaveStates)
-        state.monomers[index].assign(range.size(), {time, own.ends[1].initialState});
+        state.monomers[index].assign(range.size(), {time, 0});
     state.identities[index] = state.nextIdentity++;
     state.parents[index] = -1;
     state.population.nucleated++;

@@ -4,6 +4,9 @@
 #include "couplings/CapsuleGeometry.h"
 #include "mechanics/ChainList.h"
 #include "mechanics/MonomerTable.h"
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <vector>
@@ -24,7 +27,11 @@ struct EndState {
 struct GrowingEnd {
     std::vector<EndState> states = std::vector<EndState>(1);
     int initialState = 0;
-    bool grows() const;
+    bool grows() const {
+        return std::any_of(states.begin(), states.end(), [] (const EndState& state) {
+            return state.onRate > 0 || state.offRate > 0;
+        });
+    }
 };
 
 /** How a chain is cut at random. */
@@ -94,7 +101,9 @@ struct GrowthSystem {
     std::vector<GrowingChain> chains;
     std::vector<Nucleator> nucleators;
     /** Find the number of monomers of a pool that is closed, at first. */
-    long long countAtFirst(int pool) const;
+    long long countAtFirst(int pool) const {
+        return std::llround(pools[pool].concentration*pools[pool].volume);
+    }
 };
 
 /** What has happened at an end. */
@@ -138,7 +147,24 @@ struct GrowthState {
     PopulationEvents population;
     /** Get the state of everything before it has grown. */
     GrowthState() = default;
-    GrowthState(const GrowthSystem& system, const std::vector<MonomerRange>& ranges);
+    GrowthState(const GrowthSystem& system, const std::vector<MonomerRange>& ranges) : ranges(ranges),
+            monomers(ranges.size()), identities(ranges.size(), -1), parents(ranges.size(), -1) {
+        for (std::size_t i = 0; i < ranges.size(); i++) {
+            const GrowingChain& own = system.chains[i];
+            for (const GrowingEnd& end : own.ends) {
+                EndEvents none;
+                none.switches.resize(end.states.size());
+                events.push_back(none);
+                endStates.push_back(end.initialState);
+            }
+            if (own.monomersHaveStates)
+                monomers[i].assign(ranges[i].size(), {0, own.ends[1].initialState});
+            if (ranges[i].size() > 0)
+                identities[i] = nextIdentity++;
+        }
+        for (std::size_t pool = 0; pool < system.pools.size(); pool++)
+            free.push_back(system.countAtFirst(pool));
+    }
 };
 
 /** A step in which chains grow. */

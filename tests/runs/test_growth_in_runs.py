@@ -177,7 +177,9 @@ def test_ends_may_grow_and_shrink_in_turn():
     rates = 'catastrophe_rate = "3 1/s", rescue_rate = "1 1/s", shrinking_off_rate = "100 1/s"'
     configuration = parse(filament=FILAMENT + f'growth = {{ longest = "1 um", {rates} }}\n')
     growth = configuration.filaments[0].growth
-    assert growth.plus_instability.rates == pytest.approx((0.0, 1e-10, 3e-12, 1e-12)) and not growth.minus_instability
+    turning = growth.plus_instability
+    found = (turning.shrinking_on_rate, turning.shrinking_off_rate, turning.catastrophe_rate, turning.rescue_rate)
+    assert found == pytest.approx((0.0, 1e-10, 3e-12, 1e-12)) and not growth.minus_instability
     # A quarter of the time it grows, with 11.6 - 1.4 monomers per second at 1 uM.
     assert free_rate(growth, "plus", 1.0) == pytest.approx(0.25 * 10.2 - 0.75 * 100.0)
 

@@ -1,0 +1,146 @@
+"""Where and how often filaments begin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from openmm import unit
+
+from ..errors import InputError
+from ..units.quantities import (
+    AVOGADRO,
+    LENGTH,
+    RATE,
+    VOLUME,
+    in_units_of,
+    non_negative,
+    positive,
+    require_kind,
+    shown,
+    vector,
+    whole_number,
+)
+from ..units.types import FloatArray, Scalar, Vector
+
+if TYPE_CHECKING:
+    from ..couplings.shapes import Box, Sphere
+
+_PER_VOLUME = RATE / VOLUME
+_MOLAR = unit.mole / unit.liter
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Nucleation:
+    """Where and how often filaments begin, as straight as thermal motion lets them be.
+
+    All places of a region are as likely for their first nodes, and so are all directions. A new one that would have the
+    energy V with walls and contacts begins with the chance min(1, exp(-V/k_BT)): where filaments ``vanishes``, which
+    they do at the sum k_off of both ends, there are so many with the least number of monomers as the law of mass action
+    says, J/k_off exp(-V/k_BT).
+
+    Parameters
+    ----------
+    rate : 1/(volume*time), concentration/time, or 1/time
+        J, at the first concentration of monomers: in each volume, or in the whole region. Plain numbers are 1/ps in the
+        whole region.
+    region : Sphere or Box, optional
+        The periodic box of the System if not given.
+    length : length, optional
+        Of a new filament; the ``shortest`` of its growth if not given.
+    direction : (3,) array, optional
+        Of the first segment; any if not given.
+    order : int
+        The power of the concentration that the rate is proportional to, as a pool runs dry: 3 for nuclei of three
+        monomers.
+
+    The attributes hold plain numbers, in nm and 1/ps or 1/(nm^3 ps).
+
+    Raises
+    ------
+    InputError
+        For a rate that is negative or not finite, another region or unit, or a direction of no length.
+    """
+
+    rate: float
+    region: Sphere | Box | None = None
+    length: float | None = None
+    direction: FloatArray | None = None
+    order: int = 0
+    is_per_volume: bool = False
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            rate: Scalar,
+            region: Sphere | Box | None = None,
+            length: Scalar | None = None,
+            direction: Vector | None = None,
+            order: int = 0,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        from ..couplings.shapes import Box, Sphere
+
+        if not (self.region is None or isinstance(self.region, (Sphere, Box))):
+            raise InputError(
+                f"The region of a Nucleation must be a Sphere, a Box or None, but is {shown(self.region)}."
+            )
+        rate: Any = self.rate
+        if isinstance(rate, unit.Quantity) and rate.unit.is_compatible(_MOLAR * RATE):
+            rate = in_units_of(rate, unit.mole * _PER_VOLUME, "rate of nucleation") * AVOGADRO * _PER_VOLUME
+        if isinstance(rate, unit.Quantity) and rate.unit.is_compatible(_PER_VOLUME):
+            object.__setattr__(self, "is_per_volume", True)
+            object.__setattr__(self, "rate", non_negative(rate, _PER_VOLUME, "rate of nucleation"))
+        else:
+            object.__setattr__(self, "rate", non_negative(rate, RATE, "rate of nucleation"))
+        if self.length is not None:
+            object.__setattr__(self, "length", positive(self.length, LENGTH, "length of new filaments"))
+        if self.direction is not None:
+            direction = vector(self.direction, unit.dimensionless, "direction of new filaments")
+            if not (np.all(np.isfinite(direction)) and np.any(direction != 0.0)):
+                raise InputError("The direction of new filaments must be finite and not zero.")
+            object.__setattr__(self, "direction", direction / np.linalg.norm(direction))
+        whole_number(self.order, 0, "order of nucleation")
+
+    def whole_rate(self, box: FloatArray | None) -> float:
+        """J in 1/ps in the whole region, or in a periodic box (3, 3) in nm; InputError if there is none."""
+        if self.region is None and box is None:
+            raise InputError("A Nucleation needs a region, a Sphere or a Box, since the System has no periodic box.")
+        return self.rate * self._volume(box) if self.is_per_volume else self.rate
+
+    def _volume(self, box):
+        if self.region is None:
+            return abs(float(np.linalg.det(box)))
+        kind, numbers = self.described_region
+        return (
+            4.0 / 3.0 * np.pi * numbers[3] ** 3 if kind == 2 else float(np.prod(np.subtract(numbers[3:], numbers[:3])))
+        )
+
+    @property
+    def described_region(self) -> tuple[int, list[float]]:
+        """As a CylinderChainGrowthForce has it: 0, 1 or 2 for the box, a cuboid or a sphere, and its numbers."""
+        from ..couplings.shapes import Sphere
+
+        if self.region is None:
+            return 0, []
+        if isinstance(self.region, Sphere):
+            return 2, [*map(float, self.region.center), float(self.region.radius)]
+        return 1, [*map(float, self.region.lower), *map(float, self.region.upper)]
+
+    @property
+    def centre(self) -> FloatArray:
+        """(3,) in nm: of its region, or the origin."""
+        kind, numbers = self.described_region
+        if kind == 0:
+            return np.zeros(3)
+        return np.array(numbers[:3]) if kind == 2 else 0.5 * (np.array(numbers[:3]) + np.array(numbers[3:]))
+
+
+def require_nucleation(nucleation: Nucleation | None) -> None:
+    """Raise InputError unless it is a Nucleation or None."""
+    if nucleation is not None:
+        require_kind(nucleation, Nucleation, "nucleation")
