@@ -227,8 +227,10 @@ def _time_step(options):
     solvent, settings = configuration.solvent, configuration.simulation
     for group in configuration.filaments:
         arguments = (group.type, solvent.viscosity, solvent.temperature)
-        recommended = recommended_time_step(*arguments, settings.scheme, group.segments)
-        kind = group.type.segment_kind
+        kind, longest = group.type.segment_kind, None
+        if group.growth is not None:
+            longest = max(group.segments, round(group.growth.longest / group.type.segment_length))
+        recommended = recommended_time_step(*arguments, settings.scheme, group.segments, longest=longest)
         print(f"{group.type.name}, {group.segments} {kind.name}s of {group.type.segment_length:g} nm")
         # Table 1 is of cylinders that are straight, and explicit schemes are for straight segments and beads.
         cylinders = kind is STRAIGHT_SEGMENTS

@@ -31,6 +31,7 @@ CASES = [
     ("rearranging_network", "network", 200, 20, 140 * 11, 140 * 10),
     ("crosslinked_bundle", "bundle", 40, 40, 6 * 31, 6 * 30),
     ("treadmilling", "treadmilling", 60, 60, 24 * 57, 24 * 56),
+    ("actin_turnover", "turnover", 60, 60, 32 * 29, 32 * 28),
     ("force_extension", "dna", 200, 100, 24 * 21, 24 * 20),
 ]
 # The others are slow tests.

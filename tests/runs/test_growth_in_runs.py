@@ -223,6 +223,17 @@ def test_run_says_how_far_filaments_have_grown(directory, capsys):
     np.testing.assert_allclose(free[0] - free[-1], gained / volume / 602.214076, rtol=1e-6)
 
 
+def test_steps_resolve_the_relaxation_of_the_longest(tmp_path, capsys):
+    said = []
+    for name, growth, segments in (("still", "", 9), ("grows", GROWTH, 5)):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(HEAD + MONOMERS * bool(growth) + FILAMENT.replace("= 5", f"= {segments}") + growth + TAIL)
+        assert main(["timestep", str(path)]) == 0
+        said.append(re.search(r"allowed by relaxation +(\S+ \S+)", capsys.readouterr().out)[1])
+    # 1 um are nine segments of 108 nm.
+    assert said[0] == said[1]
+
+
 def test_a_run_reporter_writes_the_same(directory, tmp_path):
     configuration = parse_configuration(GROWING)
     simulation, built = create_simulation(configuration)
