@@ -5,6 +5,7 @@
 #include "dynamics/PackPlaces.h"
 #include "dynamics/PackProperties.h"
 #include "dynamics/PackStep.h"
+#include "dynamics/PlannedDivision.h"
 #include "lanes/InstructionSet.h"
 #include <algorithm>
 #include <cmath>
@@ -492,6 +493,12 @@ Instability ChainEngine::step(int pack, const double* positions, const double* f
             [&] (const WidePack& wide) {return stepOf(kernels().wide.step, *wide.pack);},
             [&] (int own) {return modes.isWide(own) ? stepOf(kernels().wide.stepOfModes, modes.getWide(own)) :
                     stepOf(kernels().stepOfModes, modes.get(own));});
+}
+
+bool ChainEngine::isStepDivided(int pack, int lane, const StepSettings& settings) const {
+    return implementation->with(pack, [&] (const auto& own) {return plannedDivision(own, settings, lane) > 0;},
+            [&] (const WidePack& wide) {return plannedDivision(*wide.pack, settings, lane) > 0;},
+            [] (int) {return false;});
 }
 
 unique_ptr<PackStep> ChainEngine::createStep(int pack) const {

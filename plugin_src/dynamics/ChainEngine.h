@@ -178,6 +178,10 @@ public:
     Instability step(int pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements) const;
     /**
+     * Get whether the chain in a lane takes an implicit step in parts from the start, as short ones do that turn far.
+     */
+    bool isStepDivided(int pack, int lane, const StepSettings& settings) const;
+    /**
      * Create an object that takes implicit steps of a pack whose chains are coupled to others. The pack is one of those
      * that getPacksOfStep() has returned.
      */

@@ -10,6 +10,7 @@
 #include "dynamics/ModePack.h"
 #include "dynamics/PackPlaces.h"
 #include "dynamics/PackStep.h"
+#include "dynamics/PlannedDivision.h"
 #include "lanes/Noise.h"
 #include "mechanics/Inline.h"
 #include "mechanics/PeriodicBox.h"

@@ -4,23 +4,6 @@
  * Implicit steps of a pack. Chains whose equations were not solved take theirs in parts.
  */
 
-/** A step that does not converge is cut into at most two to this power. */
-const int LARGEST_DIVISION = 16;
-/** The largest variance of an angle by which a chain may turn as a whole in a part of a step. */
-const double LARGEST_TURN = 0.2;
-
-/**
- * Find into how many parts, two to this power, the step of a chain is cut from the start, because it turns too far in
- * it. Where equations that are not solved alone decided, what is random would.
- */
-inline int plannedDivision(const Pack& pack, const StepSettings& settings, int lane) {
-    double turn = settings.mayDivide ? 2*settings.kT*settings.stepSize*pack.turning[lane] : 0;
-    int division = 0;
-    for (; turn > LARGEST_TURN && division < LARGEST_DIVISION && settings.level+division < LARGEST_LEVEL; division++)
-        turn *= 0.5;
-    return division;
-}
-
 /** Means over the parts of a divided step, for the lanes whose step is divided. */
 template <int W> class MeanOfParts {
 public:
@@ -93,7 +76,7 @@ template <int W> void divideStep(TakeStep<W> takeStep, const Pack& pack, const S
     Vector<Real>* moved = vectors.reserve<Vector<Real> >(4*n);
     Vector<Real>* change = moved+n;
     const StepStart<W> from = {moved+2*n, moved+3*n, tethers.reserve<TetherVector>(pack.tethers.size())};
-    for (int division = 1; division <= LARGEST_DIVISION && level+division <= LARGEST_LEVEL; division++) {
+    for (int division = 1; division <= LARGEST_DIVISION_OF_CHAIN && level+division <= LARGEST_LEVEL; division++) {
         bool isTried[W], anyIsTried = false;
         for (int i = 0; i < W; i++) {
             isTried[i] = failed[i] && division >= planned[i];

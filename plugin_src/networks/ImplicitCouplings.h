@@ -156,6 +156,10 @@ public:
     /** Add the forces in the step that has been solved: the means over it where they are known, or those at its end. */
     virtual void findPushes(const double*, std::vector<Push>&) const {
     }
+    /** Mark the chains that these couplings may act on in a step: all, if that is not known before. */
+    virtual void findTouched(const ChainPlaces&, std::vector<bool>& touched) const {
+        touched.assign(touched.size(), true);
+    }
     /** Add pairs of chains that these couplings join, so that a step is divided for both. */
     virtual void findNeighbours(std::vector<std::pair<int, int> >& pairs) const = 0;
 };

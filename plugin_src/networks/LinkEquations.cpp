@@ -509,6 +509,15 @@ bool LinkEquations::findCulprit(const double* moved, const CouplingEquation*, Br
     return true;
 }
 
+void LinkEquations::findTouched(const ChainPlaces& places, vector<bool>& touched) const {
+    for (const Link& link : *links)
+        for (const Place* place : {&link.first, &link.second}) {
+            PlaceOnChain found;
+            if (places.find(*place, found))
+                touched[found.chain] = true;
+        }
+}
+
 void LinkEquations::findNeighbours(vector<pair<int, int> >& pairs) const {
     for (const State& state : states)
         if (state.places[0].pack >= 0 && state.places[1].pack >= 0)

@@ -60,6 +60,7 @@ public:
     bool markUnfinished(PackFlags& packs) const override;
     void findFailures(const double* moved, std::vector<bool>& failed) override;
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
+    void findTouched(const ChainPlaces& places, std::vector<bool>& touched) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& pairs) const override;
 private:
     /** What a step keeps of a link: first what each iteration needs of all links, then what those that turn have. */

@@ -108,10 +108,15 @@ Instability NetworkStep::step(const double* positions, const double* forces, con
     choosePacks(settings);
     iterations = substitutions = 0;
     const size_t numChains = places.getNumChains();
-    const vector<bool> all(numChains, true);
+    const vector<bool> apart = findApart(settings);
+    vector<bool> together = apart;
+    together.flip();
     vector<bool> failed(numChains, false);
     Instability result;
-    const Attempt whole = {positions, forces, box, settings, all, loop};
+    const Attempt whole = {positions, forces, box, settings, together, loop};
+    result.chain = stepApart(whole, apart);
+    if (result.chain >= 0)
+        return result;
     mayBeSoft = true;
     bool taken = takeStep(whole, displacements, failed, result);
     if (!taken && areSoft) {
@@ -127,7 +132,51 @@ Instability NetworkStep::step(const double* positions, const double* forces, con
     }
     for (const Impulse& impulse : received)
         impulse.receiver->add(impulse.push, impulse.duration);
+    for (size_t chain = 0; chain < apart.size(); chain++)
+        if (apart[chain])
+            for (int particle : places.getNodes(chain))
+                copy_n(&movesApart[3*particle], 3, displacements+3*particle);
     return result;
+}
+
+/** Find the chains that take the step in parts which are known beforehand, if nothing acts on them. */
+vector<bool> NetworkStep::findApart(const StepSettings& settings) const {
+    vector<bool> apart(places.getNumChains(), false), touched(apart);
+    bool any = false;
+    for (size_t pack = 0; pack < packs.size(); pack++)
+        for (size_t lane = 0; lane < chainsOfLanes[pack].size(); lane++)
+            if (chainsOfLanes[pack][lane] >= 0 && engine.isStepDivided(packs[pack], lane, settings))
+                any = apart[chainsOfLanes[pack][lane]] = true;
+    if (!any)
+        return apart;
+    for (const ImplicitCouplings* own : ofForces)
+        own->findTouched(places, touched);
+    for (size_t chain = 0; chain < apart.size(); chain++)
+        apart[chain] = apart[chain] && !touched[chain];
+    return apart;
+}
+
+/** Let chains take the step by themselves; returns one by which that has gone wrong, or -1. */
+int NetworkStep::stepApart(const Attempt& attempt, const vector<bool>& apart) {
+    vector<int> own;
+    for (size_t pack = 0; pack < packs.size(); pack++)
+        if (any_of(chainsOfLanes[pack].begin(), chainsOfLanes[pack].end(), [&] (int chain) {
+            return chain >= 0 && apart[chain];
+        }))
+            own.push_back(packs[pack]);
+    if (own.empty())
+        return -1;
+    movesApart.resize(moved.size());
+    vector<int> failed(own.size(), -1);
+    attempt.loop(own.size(), [&] (int i) {
+        failed[i] = engine.step(own[i], attempt.positions, attempt.forces, attempt.box, attempt.settings,
+                movesApart.data()).chain;
+    });
+    // Others in these packs take the step with their couplings.
+    for (int chain : failed)
+        if (chain >= 0 && apart[chain])
+            return chain;
+    return -1;
 }
 
 /** Attempt a step, and divide it for those chains that it fails for; false if that fails as well. */

@@ -58,6 +58,8 @@ private:
     BrokenCoupling findCulprit() const;
     std::vector<bool> findComponents(const std::vector<bool>& failed) const;
     void choosePacks(const StepSettings& settings);
+    std::vector<bool> findApart(const StepSettings& settings) const;
+    int stepApart(const Attempt& attempt, const std::vector<bool>& apart);
     const ChainEngine& engine;
     const PackStepSource& beamEngine;
     ChainPlaces places;
@@ -84,6 +86,8 @@ private:
     /** Where those of each force begin. */
     std::vector<std::size_t> firstEquations;
     std::vector<double> moved, compliances;
+    /** Of chains that take the step by themselves. */
+    std::vector<double> movesApart;
     LaneFlags unfinished, flags;
     /** The packs that take part in an iteration: the others have converged, and nothing holds them otherwise. */
     PackFlags active;
