@@ -98,7 +98,7 @@ def test_the_recommended_step_resolves_contacts_that_ends_push():
     growth = Growth(monomers=ACTIN_ATP, pool=unit.Quantity(5e-6, unit.molar), longest=2000.0)
     filaments.add_straight(F_ACTIN.with_segment_length(108.0), 10, [0, 0, 0], [1, 0, 0], growth=growth)
     _, system, _ = filaments.build()
-    sphere, friction, stiffness = system.addParticle(1.0), 100.0, 2.0
+    sphere, friction, stiffness = system.addParticle(1.0), 100.0, 3.0
     options = {"particles": [sphere], "particle_diameter": 1000.0}
     system.addForce(capsule_contact_force(filaments, system, 7.0, stiffness, **options))
     found = filaments.recommended_time_step(system=system, particle_friction=friction)
