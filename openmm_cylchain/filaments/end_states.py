@@ -246,7 +246,7 @@ class TwoUnitCap:
             object.__setattr__(self, name, non_negative(getattr(self, name), RATE, name))
 
     def states(self, on_rate: float, off_rate: float) -> EndStates:
-        """Of an end with the rates of its monomers, in nm^3/ps and 1/ps: which of both units are capped, "shrinking"."""
+        """Of an end with the rates of its monomers, in nm^3/ps and 1/ps: which units are capped, "shrinking"."""
         h = self.hydrolysis_rate
         return EndStates(
             on_rates=(on_rate, on_rate, on_rate, 0.0),

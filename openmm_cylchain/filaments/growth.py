@@ -214,8 +214,8 @@ class Severing:
     """How a filament is cut at random, between any two of its monomers.
 
     Both parts are filaments then, and lengths and bends keep their equilibrium. The part at the plus end becomes one of
-    those that ``Filaments.add_reserve`` has added. A part that is shorter than ``Growth.shortest`` vanishes if filaments
-    vanish, and filaments are not cut there if not.
+    those that ``Filaments.add_reserve`` has added. A part that is shorter than ``Growth.shortest`` vanishes if its
+    filament ``vanishes``, and filaments are not cut there if not.
 
     Parameters
     ----------

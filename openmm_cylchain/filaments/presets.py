@@ -98,7 +98,7 @@ ACTIN_AGING = replace(
 
 New ones have the rates of ACTIN_ATP; k_off of ADP-Pi 0.2 and 0.02 per s at the plus and minus end, and of ADP 5.4 and
 0.25 per s (Fujiwara, Vavylonis and Pollard, Proc. Natl. Acad. Sci. 2007, 104, 8827). Hydrolysis at 0.3 per s (Blanchoin
-and Pollard, Biochemistry 2002, 41, 597), phosphate at 0.0026 per s (Carlier and Pantaloni, Biochemistry 1986, 25, 7789).
+and Pollard, Biochemistry 2002, 41, 597), phosphate at 0.0026 per s (Carlier, Pantaloni, Biochemistry 1986, 25, 7789).
 """
 
 TUBULIN = Monomers(

@@ -227,7 +227,8 @@ class Filaments(TiedFilaments):
         harmonic; walls as if all their particles were in contact, and contacts of two filaments as if they crossed at
         their ends, or touched all along with an error of a third.
         Other forces are listed in ``unknown_forces``. Filaments that constant forces, tethers or propulsion compress
-        bind it by the rate with which they buckle (see ``buckling_step``).
+        bind it by the rate with which they buckle (see ``buckling_step``). Where ends that grow may push walls or
+        contacts, they gain a fifth of a monomer in a step, which resolves contacts (see ``growth_step``).
 
         Parameters
         ----------

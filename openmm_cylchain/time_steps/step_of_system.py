@@ -50,7 +50,7 @@ def recommended_step_of(
         steps += _steps_of_diffusion(filaments, system, temperature, confidence, scheme, coupled)
         if scheme in IMPLICIT_SCHEMES:
             steps += steps_of_couplings(filaments, system, temperature, particle_friction, coupled)
-        steps += steps_of_growth(filaments, system)
+        steps += steps_of_growth(filaments, system, particle_friction, coupled)
         steps += steps_of_kinetics(filaments, system, scheme, temperature, particle_friction)
         explicit = ExplicitForces(system, filaments, scheme, particle_friction, coupled)
         steps.append(explicit.recommended_step())

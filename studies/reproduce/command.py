@@ -14,7 +14,8 @@ def add_command(commands):
         "diffusion: Chandran and Mofrad, Phys. Rev. E 2009, 79, 011906; "
         "panja2015: Panja, Barkema and van Leeuwen, Phys. Rev. E 2015, 92, 032603; "
         "beams: accuracy of beam elements and straight segments against the number of unknowns; "
-        "compression: Simularium's comparison of compressed actin",
+        "compression: Simularium's comparison of compressed actin; "
+        "ratchets: filaments that grow against loads, after Peskin, Odell and Oster, Biophys. J. 1993, 65, 316",
     )
     parser.add_argument("--figure", type=int, metavar="N", help="only this figure of the paper")
     parser.add_argument("--quick", action="store_true", help="reduced statistics, five minutes at most")

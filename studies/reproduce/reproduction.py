@@ -11,7 +11,7 @@ from openmm_cylchain.errors import InputError
 from openmm_cylchain.output.files import write_atomically
 from openmm_cylchain.version import __version__
 
-from . import actin_compression, beam_accuracy, chandran2009, panja2015, pesek2016, style
+from . import actin_compression, beam_accuracy, chandran2009, growth_under_load, panja2015, pesek2016, style
 from .page import format_page
 from .records import Records
 
@@ -21,6 +21,7 @@ PAPERS = {
     "panja2015": panja2015,
     "beams": beam_accuracy,
     "compression": actin_compression,
+    "ratchets": growth_under_load,
 }
 _RESULTS, _MEASUREMENTS = "results.json", "measurements"
 
