@@ -42,14 +42,15 @@ from .filaments.end_states import DynamicInstability, EndStates, TwoUnitCap
 from .filaments.filament import Filament, Tether
 from .filaments.filament_type import FilamentType
 from .filaments.growth import Growth, MonomerPool, Monomers, MonomerState, Severing
-from .filaments.nucleation import Nucleation
 from .filaments.presets import ACTIN_AGING, ACTIN_ATP, DSDNA, F_ACTIN, MICROTUBULE, TUBULIN
 from .filaments.segment_place import SegmentPlace
 from .filaments.shapes import FilamentOptions
+from .kinetics.branching import Branching
 from .kinetics.crosslinker import Crosslinker
 from .kinetics.growth_force import FilamentGrowth
 from .kinetics.hand import Hand
 from .kinetics.linker_table import LinkerTable
+from .kinetics.nucleation import Nucleation
 from .kinetics.presets import ALPHA_ACTININ, DYNEIN, FILAMIN, KINESIN_1, MYOSIN_II
 from .mechanics.flow import Flow
 from .mechanics.friction import EndCorrections, SegmentFriction, stokes_friction
@@ -68,6 +69,7 @@ from .time_steps.time_step import TimeStep, effective_rate
 from .version import __version__
 
 __all__ = [
+    "Branching",
     "TwoUnitCap",
     "Severing",
     "Nucleation",

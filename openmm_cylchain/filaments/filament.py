@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,6 @@ from ..units.quantities import (
 from ..units.types import FloatArray
 from .chain_type import Chain, ChainType
 from .growth import Growth
-from .nucleation import Nucleation
 from .placement import joint_stiffnesses
 
 NODE_NAME = "NOD"
@@ -63,7 +63,7 @@ class Filament:
         How many particles it has besides its nodes, which become nodes as it grows.
     is_reserve : bool
         It has not begun yet: both of its nodes are in one place, which is no place of a filament.
-    nucleation : Nucleation or None
+    nucleation : kinetics.nucleation.Nucleation or None
         How those that have not begun do so, if not as a part of one that is cut.
     """
 
@@ -78,7 +78,7 @@ class Filament:
     growth: Growth | None = None
     spare_nodes: int = 0
     is_reserve: bool = False
-    nucleation: Nucleation | None = None
+    nucleation: Any = None
 
     def __post_init__(self) -> None:
         require_kind(self.type, ChainType, "Filament: type")

@@ -1,6 +1,6 @@
 """Shapes of new filaments: straight ones, rings, draws from equilibrium and given ones, with what they are given."""
 
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from ..units.types import Indices, Scalar, Vector, Vectors
 from .chain_type import ChainType, Points
 from .filament import Filament
 from .growth import Growth, check_growth
-from .nucleation import Nucleation
 from .placement import check_shape, in_one_plane, planar_direction
 
 MINIMUM_RING = 4
@@ -187,7 +186,7 @@ def reserve_filament(
     filament_type: ChainType,
     label: str,
     growth: Growth,
-    nucleation: Nucleation | None,
+    nucleation: Any,
     planar: bool,
     propulsion: Scalar,
 ) -> Filament:

@@ -15,6 +15,7 @@ from ..mechanics.geometry import to_nearest_images
 from ..units.quantities import require_kind, thermal_energy
 from ..units.types import FloatArray, IntArray
 from .first_places import FirstPlaces, contour_of
+from .growth_force import branchings_of
 from .hand import Hand
 from .linker_table import LinkerTable
 from .linkers import LinkerPulls, Linkers
@@ -79,8 +80,20 @@ def make_binding_force(
         force.setLinkerTypeReservoir(number, own.volume or 0.0, density)
         for anchor in () if own.anchors is None else own.anchors:
             _add_anchor(force, anchor)
+    _add_branch_joints(force, filaments, len(linkers))
     place_linkers(force, linkers, filaments, temperature, positions, box)
     return force
+
+
+def _add_branch_joints(force, filaments, types):
+    # Their linkers are the last ones, in the order of the nucleators.
+    branchings = branchings_of(filaments)
+    first = types - sum(len(own.springs) for _, own in branchings)
+    for nucleator, own in branchings:
+        springs = own.springs
+        numbers = list(range(first, first + len(springs)))
+        force.addBranchJoint(nucleator, numbers, [spring[2] for spring in springs], [spring[3] for spring in springs])
+        first += len(springs)
 
 
 def place_linkers(

@@ -17,6 +17,7 @@ from ..filaments.grown import count_nodes_of_monomers, rest_lengths
 from ..filaments.growth import joints_by_monomers, segments_by_monomers
 from ..units.quantities import AVOGADRO, LENGTH, NUMBER_DENSITY, shown
 from ..units.types import BoolArray, FloatArray, IntArray
+from .branching import Branching
 from .first_places import contour_of
 
 GROWTH_FORCE_NAME = "Growth"
@@ -65,10 +66,32 @@ def make_growth_force(
         _set_ends(force, index, growth)
         if filament.nucleation is not None:
             begin.setdefault(id(filament.nucleation), []).append(index)
-    growing = [filament for filament in filaments if filament.growth is not None]
+    growing = [number for number, filament in enumerate(filaments) if filament.growth is not None]
     for indices in begin.values():
-        _add_nucleator(force, growing[indices[0]], indices, box)
+        _add_nucleator(force, filaments[growing[indices[0]]], indices, box)
+    for nucleator, branching in branchings_of(filaments):
+        _set_branching(force, nucleator, branching, filaments, growing)
     return force
+
+
+def branchings_of(filaments: Sequence[Filament]) -> list[tuple[int, Branching]]:
+    """Those by which filaments begin, with the numbers of their nucleators."""
+    nucleations = list({id(own.nucleation): own.nucleation for own in filaments if own.nucleation is not None}.values())
+    return [(number, own) for number, own in enumerate(nucleations) if isinstance(own, Branching)]
+
+
+def _set_branching(force, nucleator, branching, filaments, growing):
+    mothers = growing if branching.mothers is None else branching.mothers
+    for number in mothers:
+        if number >= len(filaments) or number not in growing:
+            raise InputError(f"Filament {number} cannot have branches: it does not grow, or does not exist.")
+    lengths = {filaments[number].growth.monomers.length for number in mothers}
+    if len(lengths) > 1:
+        raise InputError("Filaments of different monomers have no branches of one kind: give mothers of one kind.")
+    beyond = branching.lever if len(mothers) else 0.0
+    indices = [growing.index(number) for number in mothers]
+    stiffness = branching.angular_stiffness
+    force.setBranching(nucleator, branching.angle, stiffness, branching.distance, beyond, indices)
 
 
 def _set_ends(force, index, growth):
@@ -93,8 +116,11 @@ def _add_nucleator(force, filament, indices, box):
     if nucleation.length is not None:
         monomers = round(nucleation.length / growth.monomers.length)
     direction = np.zeros(3) if nucleation.direction is None else nucleation.direction
+    rate = nucleation.whole_rate(box)
+    if isinstance(nucleation, Branching):
+        rate *= growth.monomers.length
     force.addNucleator(
-        nucleation.whole_rate(box),
+        rate,
         nucleation.order,
         monomers,
         *nucleation.described_region,

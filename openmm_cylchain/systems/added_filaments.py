@@ -14,8 +14,8 @@ from ..filaments import shapes
 from ..filaments.chain_type import ChainType
 from ..filaments.filament import Filament
 from ..filaments.growth import Growth
-from ..filaments.nucleation import Nucleation, require_nucleation
 from ..filaments.shapes import FilamentOptions
+from ..kinetics.nucleation import Nucleation, require_nucleation
 from ..units.quantities import TEMPERATURE, VISCOSITY, non_negative, positive, shown, whole_number
 from ..units.types import IntArray, Scalar, Vector, Vectors
 
@@ -253,7 +253,7 @@ class AddedFilaments:
             How many there can be at once, besides others.
         growth : Growth
             With ``vanishes=True``, filaments give their place back.
-        nucleation : Nucleation, optional
+        nucleation : Nucleation, or Branching, optional
             How they begin; only as parts if not given.
         planar, propulsion
             See ``FilamentOptions``.

@@ -14,6 +14,7 @@ from ..filaments.growth_refusals import growth_refusal
 from ..filaments.placement import named_nodes
 from ..filaments.segment_place import SegmentPlace
 from ..kinetics.crosslinker import Crosslinker
+from ..kinetics.growth_force import branchings_of
 from ..kinetics.linkers import Linkers, as_linkers, warn_if_springs_do_not_fit
 from ..units.quantities import LENGTH, STIFFNESS, positive, shown, vector, whole_number
 from ..units.types import Indices, IntArray, Scalar, Vector, Vectors
@@ -264,8 +265,10 @@ class TiedFilaments(AddedFilaments):
 
     @property
     def linkers(self) -> tuple[Linkers, ...]:
-        """Tuple of the types of linkers, in the order of their numbers, as they were added."""
-        return tuple(self._linkers)
+        """Tuple of the types of linkers, in the order of their numbers, as they were added, and behind them those of
+        the joints of branches."""
+        joints = [own.linkers(f"branch_{number}") for number, own in branchings_of(self._filaments)]
+        return (*self._linkers, *(linkers for joint in joints for linkers in joint))
 
     def _attach(self, attachment):
         self._attachments.append(attachment)
@@ -292,7 +295,7 @@ class TiedFilaments(AddedFilaments):
             tuple(self._tethers),
             self._viscosity,
             self._temperature,
-            tuple(self._linkers),
+            self.linkers,
             self._periodic,
             tuple(self._control_points),
         )

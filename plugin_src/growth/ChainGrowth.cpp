@@ -88,7 +88,7 @@ bool ChainGrowth::takeTurns(GrowthState& state, const GrowthStep& step, Group& g
             ends.apply(state, event, state.time+time, step.kT, random, chains);
             continue;
         }
-        const int begun = population.apply(state, step, event, state.time+time, random, chains, changes.cuts);
+        const int begun = population.apply(state, step, event, state.time+time, random, chains, changes);
         if (begun >= 0 && &groups[groupOf[begun]] != &group &&
                 !takeTurns(state, step, groups[groupOf[begun]], time, chains, changes))
             return false;

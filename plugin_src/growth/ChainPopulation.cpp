@@ -19,6 +19,8 @@ void ChainPopulation::listNucleation(const GrowthState& state, int number, vecto
         if (state.free[pool] < nucleator.monomers)
             rate = 0;
     }
+    if (!nucleator.mothers.empty())
+        rate *= countMonomers(nucleator, state);
     if (rate > 0)
         events.push_back({GrowthEvent::Nucleate, number, rate});
 }
@@ -38,11 +40,11 @@ void ChainPopulation::listEvents(const GrowthState& state, int index, vector<Gro
 }
 
 int ChainPopulation::apply(GrowthState& state, const GrowthStep& step, const GrowthEvent& event, double time,
-        RandomNumbers& random, ChainsInStep& chains, vector<ChainCut>& cuts) {
+        RandomNumbers& random, ChainsInStep& chains, GrowthChanges& changes) {
     if (event.kind == GrowthEvent::Nucleate)
-        return nucleate(state, step, system.nucleators[event.index], time, random, chains);
+        return nucleate(state, step, event.index, time, random, chains, changes);
     if (event.kind == GrowthEvent::Sever)
-        return sever(state, step, event.index, time, random, chains, cuts);
+        return sever(state, step, event.index, time, random, chains, changes);
     vanish(state, event.index, random, chains);
     return -1;
 }
@@ -81,8 +83,86 @@ double ChainPopulation::findTetherEnergy(int index, const Vec3d& first, const Ch
     return energy;
 }
 
-int ChainPopulation::nucleate(GrowthState& state, const GrowthStep& step, const Nucleator& nucleator, double time,
-        RandomNumbers& random, ChainsInStep& chains) {
+/** Find how many monomers all mothers have that chains may be branches of. */
+long long ChainPopulation::countMonomers(const Nucleator& nucleator, const GrowthState& state) const {
+    long long count = 0;
+    for (int mother : nucleator.mothers)
+        count += state.ranges[mother].size();
+    return count;
+}
+
+bool ChainPopulation::isInRegion(const Nucleator& nucleator, const Vec3d& place) const {
+    if (nucleator.region == NucleationRegion::Sphere)
+        return (place-nucleator.centre).squared() <= nucleator.radius*nucleator.radius;
+    const Vec3d &low = nucleator.lower, &high = nucleator.upper;
+    return nucleator.region == NucleationRegion::PeriodicBox || (place.x >= low.x && place.x <= high.x &&
+            place.y >= low.y && place.y <= high.y && place.z >= low.z && place.z <= high.z);
+}
+
+/** Draw the angle of a branch in equilibrium: its density is sin(theta) exp(-K (theta-theta0)^2/2 k_B T). */
+double ChainPopulation::drawAngle(const BranchPlace& branch, double kT, RandomNumbers& random) const {
+    const double deviation = branch.stiffness > 0 ? sqrt(kT/branch.stiffness) : HUGE_VAL;
+    while (true) {
+        double angle = branch.angle;
+        if (deviation > 1)
+            angle = M_PI*random.uniform();
+        else if (kT > 0)
+            angle += deviation*sqrt(2*random.exponential())*cos(2*M_PI*random.uniform());
+        const double off = (angle-branch.angle)/deviation;
+        const double weight = deviation > 1 ? sin(angle)*exp(-0.5*off*off) : sin(angle);
+        if (angle > 0 && angle < M_PI && (kT == 0 || random.uniform() < weight))
+            return angle;
+    }
+}
+
+/** Draw where a branch begins; false if none does there. */
+bool ChainPopulation::findBranchPlace(const GrowthState& state, const GrowthStep& step, int number,
+        RandomNumbers& random, ChainsInStep& chains, ChainBranch& branch, Vec3d& start, Vec3d& direction) {
+    const Nucleator& nucleator = system.nucleators[number];
+    long long monomer = static_cast<long long>(random.uniform()*countMonomers(nucleator, state));
+    size_t chosen = 0;
+    while (monomer >= state.ranges[nucleator.mothers[chosen]].size())
+        monomer -= state.ranges[nucleator.mothers[chosen++]].size();
+    const int mother = nucleator.mothers[chosen];
+    const vector<double> along = shapes.findLengths(mother, state.ranges[mother]);
+    branch = {number, -1, system.chains[mother].chain, along[0]+(monomer+random.uniform())*
+            shapes.getMonomerLength(mother)};
+    if (branch.along+nucleator.branch.beyond > along.back())
+        return false;
+    const vector<Vec3d>& nodes = chains.getNodes(mother);
+    size_t segment = 0;
+    while (segment+2 < nodes.size() && branch.along > along[segment+1])
+        segment++;
+    const Vec3d between = nodes[segment+1]-nodes[segment];
+    const Vec3d place = nodes[segment]+between*((branch.along-along[segment])/(along[segment+1]-along[segment]));
+    if (!isInRegion(nucleator, place))
+        return false;
+    const Vec3d tangent = between*(1/sqrt(between.squared()));
+    const double azimuth = 2*M_PI*random.uniform(), angle = drawAngle(nucleator.branch, step.kT, random);
+    Vec3d across;
+    if (shapes.isPlanar(mother))
+        across = Vec3d {-tangent.y, tangent.x, 0}*(azimuth < M_PI ? 1 : -1);
+    else {
+        Vec3d first = tangent.cross(fabs(tangent.x) < 0.6 ? Vec3d {1, 0, 0} : Vec3d {0, 1, 0});
+        first = first*(1/sqrt(first.squared()));
+        across = first*cos(azimuth)+tangent.cross(first)*sin(azimuth);
+    }
+    start = place+across*nucleator.branch.distance;
+    direction = tangent*cos(angle)+across*sin(angle);
+    return true;
+}
+
+int ChainPopulation::nucleate(GrowthState& state, const GrowthStep& step, int number, double time,
+        RandomNumbers& random, ChainsInStep& chains, GrowthChanges& changes) {
+    const Nucleator& nucleator = system.nucleators[number];
+    ChainBranch branch = {number, -1, -1, 0};
+    Vec3d start, direction = nucleator.direction;
+    if (!nucleator.mothers.empty()) {
+        if (!findBranchPlace(state, step, number, random, chains, branch, start, direction))
+            return -1;
+    }
+    else
+        start = drawPlace(nucleator, step, random);
     const auto found = find_if(nucleator.chains.begin(), nucleator.chains.end(), [&] (int index) {
         return state.ranges[index].size() == 0;
     });
@@ -93,8 +173,9 @@ int ChainPopulation::nucleate(GrowthState& state, const GrowthStep& step, const 
     const int index = *found;
     const GrowingChain& own = system.chains[index];
     const MonomerRange range = {0, nucleator.monomers};
-    const vector<Vec3d> before = {drawPlace(nucleator, step, random)};
-    const Vec3d direction = nucleator.direction.squared() > 0 ? nucleator.direction : drawDirection(index, random);
+    const vector<Vec3d> before = {start};
+    if (direction.squared() == 0)
+        direction = drawDirection(index, random);
     const vector<Vec3d> nodes = shapes.draw(index, range, before[0], direction, step.kT, random);
     const vector<double> alongBefore = {0}, alongAfter = shapes.findLengths(index, range);
     const EndChange change = {own.chain, 1, before, nodes, 0, static_cast<int>(nodes.size())-1, alongBefore,
@@ -112,6 +193,10 @@ int ChainPopulation::nucleate(GrowthState& state, const GrowthStep& step, const 
     state.identities[index] = state.nextIdentity++;
     state.parents[index] = -1;
     state.population.nucleated++;
+    if (branch.mother >= 0) {
+        branch.chain = own.chain;
+        changes.branches.push_back(branch);
+    }
     return index;
 }
 
@@ -160,7 +245,7 @@ bool ChainPopulation::mayCut(GrowthState& state, int index, int monomer, double 
 }
 
 int ChainPopulation::sever(GrowthState& state, const GrowthStep& step, int index, double time,
-        RandomNumbers& random, ChainsInStep& chains, vector<ChainCut>& cuts) {
+        RandomNumbers& random, ChainsInStep& chains, GrowthChanges& changes) {
     const GrowingChain& own = system.chains[index];
     const MonomerRange before = state.ranges[index];
     const int monomer = before.first+1+min(before.size()-2, static_cast<int>(random.uniform()*(before.size()-1)));
@@ -235,7 +320,7 @@ int ChainPopulation::sever(GrowthState& state, const GrowthStep& step, int index
     }
     setParts(state, index, part, monomer, stays, time, random);
     if (part != index)
-        cuts.push_back({own.chain, system.chains[part].chain, cut});
+        changes.cuts.push_back({own.chain, system.chains[part].chain, cut});
     state.population.severed++;
     return part == index ? -1 : part;
 }

@@ -27,11 +27,11 @@ public:
     /**
      * Let an event happen at a time, unless energies, or a lack of chains, are against it.
      *
-     * @param cuts  receives where a chain was cut
+     * @param changes  receives where a chain was cut, or has got a branch
      * @return the number of the growing chain that has begun, or is a part, or -1
      */
     int apply(GrowthState& state, const GrowthStep& step, const GrowthEvent& event, double time, RandomNumbers& random,
-            ChainsInStep& chains, std::vector<ChainCut>& cuts);
+            ChainsInStep& chains, GrowthChanges& changes);
 private:
     /** A side of a chain that is cut: its nodes and lengths along it before its segments are those of its monomers. */
     struct CutSide {
@@ -41,11 +41,16 @@ private:
         /** How many segments at the cut become one. */
         int segments = 1;
     };
-    int nucleate(GrowthState& state, const GrowthStep& step, const Nucleator& nucleator, double time,
-            RandomNumbers& random, ChainsInStep& chains);
+    int nucleate(GrowthState& state, const GrowthStep& step, int nucleator, double time, RandomNumbers& random,
+            ChainsInStep& chains, GrowthChanges& changes);
+    bool findBranchPlace(const GrowthState& state, const GrowthStep& step, int number, RandomNumbers& random,
+            ChainsInStep& chains, ChainBranch& branch, Vec3d& start, Vec3d& direction);
+    bool isInRegion(const Nucleator& nucleator, const Vec3d& place) const;
+    double drawAngle(const BranchPlace& branch, double kT, RandomNumbers& random) const;
+    long long countMonomers(const Nucleator& nucleator, const GrowthState& state) const;
     void vanish(GrowthState& state, int index, RandomNumbers& random, ChainsInStep& chains);
     int sever(GrowthState& state, const GrowthStep& step, int index, double time, RandomNumbers& random,
-            ChainsInStep& chains, std::vector<ChainCut>& cuts);
+            ChainsInStep& chains, GrowthChanges& changes);
     CutSide cutSide(int index, int side, double cut, const std::vector<Vec3d>& nodes, const std::vector<double>& along,
             MonomerRange before, MonomerRange range, double kT, RandomNumbers& random) const;
     void setParts(GrowthState& state, int index, int part, int monomer, const bool* stays, double time,

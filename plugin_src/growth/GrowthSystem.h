@@ -74,9 +74,17 @@ struct MonomerPool {
 /** Where chains begin: in the periodic box, in a box of its own, or in a sphere. */
 enum class NucleationRegion : int {PeriodicBox, Cuboid, Sphere};
 
+/** How a chain begins as a branch of another one. */
+struct BranchPlace {
+    /** The angle between both, towards the plus ends, and the stiffness in kJ/mol of its energy K (theta-theta0)^2/2. */
+    double angle = 0, stiffness = 0;
+    /** How far from the axis of the other one it begins, and how much of that must be there beyond the place. */
+    double distance = 0, beyond = 0;
+};
+
 /** Where and how often chains begin. */
 struct Nucleator {
-    /** The rate, in 1/ps, in all of the region, at the first concentration of the pool. */
+    /** The rate, in 1/ps, at the first concentration of the pool: in all of the region, or for each monomer of mothers. */
     double rate = 0;
     /** Which power of the concentration it is proportional to. */
     int order = 0;
@@ -92,6 +100,9 @@ struct Nucleator {
     Vec3d direction = {0, 0, 0};
     /** The numbers of the growing chains that may begin, which are all the same but for where they are. */
     std::vector<int> chains;
+    /** Those of which they are branches, wherever these are in the region, or none. */
+    std::vector<int> mothers;
+    BranchPlace branch;
 };
 
 /** What grows. */
@@ -176,12 +187,21 @@ struct GrowthStep {
     bool takesNearestImages = false;
 };
 
+/** A chain that has begun as a branch. */
+struct ChainBranch {
+    int nucleator;
+    /** Its number and that of its mother among all chains, and where that is along the mother. */
+    int chain, mother;
+    double along;
+};
+
 /** What a step has changed. */
 struct GrowthChanges {
     /** The growing chains that have changed, by their numbers among these. */
     std::vector<int> chains;
     /** Where chains were cut, one after the other. */
     std::vector<ChainCut> cuts;
+    std::vector<ChainBranch> branches;
     /** The number of a growing chain the rates of which are too large for the step, or -1. */
     int failed = -1;
 };

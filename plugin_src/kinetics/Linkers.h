@@ -62,6 +62,15 @@ struct LinkerType {
     double concentration = -1;
 };
 
+/** What holds chains that begin as branches by a nucleator: a linker of each of some types. */
+struct BranchJoint {
+    int nucleator;
+    /** They must be of nothing else. */
+    std::vector<int> types;
+    /** Where they hold the mother, beyond the place of the branch, and the branch. */
+    std::vector<double> onMother, onBranch;
+};
+
 /** Where a hand is bound. */
 struct HandPlace {
     /** -1 if it is not. */

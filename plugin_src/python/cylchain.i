@@ -121,7 +121,7 @@ static void raiseException(const std::exception& e) {
 %apply int& OUTPUT {int& bendingModel, int& stretchingModel, int& chain, int& node, int& particle, int& steps,
         int& particles, int& chain1, int& segment1, int& chain2, int& segment2, int& hand1, int& hand2,
         int& table, int& pool, int& firstMonomer, int& lastMonomer, int& leastMonomers, int& monomersPerSegment,
-        int& initialState, int& minusState, int& plusState, int& order, int& monomers, int& region};
+        int& initialState, int& minusState, int& plusState, int& order, int& monomers, int& region, int& nucleator};
 
 %typemap(in, numinputs=0) Vec3& point (OpenMM::Vec3 value) {
     $1 = &value;
@@ -233,7 +233,8 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         double& propulsion, double& work, double& bindingRate, double& reach, double& unbindingRate,
         double& strainShare, double& unbindingForce, double& catchRate, double& catchForce, double& speed,
         double& stallForce, double& volume, double& concentration, double& elementLength, double& stretchingModulus,
-        double& bendingRigidity, double& shortening, double& rate};
+        double& bendingRigidity, double& shortening, double& rate, double& angle,
+        double& distance, double& beyond};
 %apply bool& OUTPUT {bool& walksBackward, bool& holdsAtEnds, bool& sameChain, bool& vanishes};
 %apply long long& OUTPUT {long long& bindings, long long& unbindings};
 
@@ -445,6 +446,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %ignore OpenMM::CylinderChainWallForce::getWalls;
 %ignore OpenMM::CylinderChainBindingForce::getState;
 %ignore OpenMM::CylinderChainBindingForce::getHand;
+%ignore OpenMM::CylinderChainBindingForce::getBranchJoint;
 %ignore OpenMM::CylinderChainBindingForce::getLinkerType;
 %ignore OpenMM::CylinderChainGrowthForce::getSystem;
 %ignore OpenMM::CylinderChainGrowthForce::getState;

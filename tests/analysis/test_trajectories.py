@@ -103,7 +103,7 @@ def test_selection_of_filaments(corners):
 
 def test_coinciding_nodes_have_no_tangent():
     with pytest.raises(InputError, match="one point"):
-        analysis.tangents(make_trajectory([np.zeros((2, 3, 3))]))
+        analysis.tangents(make_trajectory([np.array(2 * [[[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]])]))
 
 
 def test_tangent_correlation_of_equilibrium_draws(flexible, equilibrium):

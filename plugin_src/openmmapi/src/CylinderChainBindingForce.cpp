@@ -259,6 +259,25 @@ void CylinderChainBindingForce::setLinkers(const vector<int>& numbers, const vec
     state.nextNumber = nextNumber;
 }
 
+int CylinderChainBindingForce::addBranchJoint(int nucleator, const vector<int>& types,
+        const vector<double>& parameters, const vector<double>& places) {
+    if (nucleator < 0 || types.empty() || parameters.size() != types.size() || places.size() != types.size())
+        throw OpenMMException("CylinderChainBindingForce: The joint of branches needs a nucleator, and two places for "
+                "each of one type or more");
+    branchJoints.push_back({nucleator, types, parameters, places});
+    return branchJoints.size()-1;
+}
+
+void CylinderChainBindingForce::getBranchJointParameters(int index, int& nucleator, vector<int>& types,
+        vector<double>& parameters, vector<double>& places) const {
+    ASSERT_VALID_INDEX(index, branchJoints);
+    const cylchain::BranchJoint& own = branchJoints[index];
+    nucleator = own.nucleator;
+    types = own.types;
+    parameters = own.onMother;
+    places = own.onBranch;
+}
+
 void CylinderChainBindingForce::getLinkersInContext(Context& context, vector<int>& numbers, vector<int>& types,
         vector<int>& anchors, vector<int>& chains, vector<double>& places, int& nextNumber) const {
     CylinderChainBindingForceImpl& impl = dynamic_cast<CylinderChainBindingForceImpl&>(getImplInContext(context));

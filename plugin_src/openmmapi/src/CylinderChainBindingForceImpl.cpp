@@ -106,7 +106,13 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
             place.point[k] = point[k];
         system.anchors.push_back(place);
     }
+    for (int i = 0; i < owner.getNumBranchJoints(); i++)
+        for (int type : owner.getBranchJoint(i).types)
+            require(type >= 0 && type < owner.getNumLinkerTypes() && system.types[type].hands[0] >= 0 &&
+                    system.types[type].concentration == 0, "The joint of branches "+to_string(i)+" needs linkers with "
+                    "two hands that come from no concentration");
     state = owner.getState();
+    state.events.resize(system.types.size());
     checkLinkers(state.linkers, system, contours.get());
     const CylinderChainIntegrator* integrator = findIntegrator();
     seed = (uint32_t) (integrator == NULL ? owner.getRandomNumberSeed() : integrator->getRandomNumberSeed());
@@ -192,6 +198,8 @@ void CylinderChainBindingForceImpl::updateContextState(ContextImpl& context, boo
     countBefore = context.getStepCount();
     stepSize = size;
     upToDate = true;
+    if (removeBrokenBranches())
+        accept();
     require(failed >= -1, "More than ten million linkers of type "+to_string(-2-failed)+" come out of their "
             "concentration within a step: use a smaller step, or look at the concentration and the rates");
     require(failed == -1, "The hands of linker "+to_string(failed)+" bind, unbind or walk more than a hundred thousand "
@@ -226,11 +234,67 @@ void CylinderChainBindingForceImpl::setState(const cylchain::LinkerState& replac
 }
 
 void CylinderChainBindingForceImpl::chainsHaveGrown(ContextImpl&, const cylchain::ChainList& chains,
-        const vector<cylchain::ChainCut>& cuts) {
+        const cylchain::GrowthChanges& changes) {
     contours.reset(new cylchain::Contours(chains));
     upToDate = false;
-    if (linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().setChains(chains, cuts, state))
+    bool any = linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().setChains(chains, changes.cuts, state);
+    any |= addBranches(changes.branches);
+    any |= removeBrokenBranches();
+    if (any)
         accept();
+}
+
+/** Hold chains that have begun as branches. */
+bool CylinderChainBindingForceImpl::addBranches(const vector<cylchain::ChainBranch>& branches) {
+    bool any = false;
+    for (const cylchain::ChainBranch& branch : branches)
+        for (int i = 0; i < owner.getNumBranchJoints(); i++) {
+            const cylchain::BranchJoint& joint = owner.getBranchJoint(i);
+            if (joint.nucleator != branch.nucleator)
+                continue;
+            for (size_t k = 0; k < joint.types.size(); k++) {
+                cylchain::Linker linker;
+                linker.number = state.nextNumber++;
+                linker.type = joint.types[k];
+                linker.hands[0] = {branch.mother, branch.along+joint.onMother[k]};
+                linker.hands[1] = {branch.chain, joint.onBranch[k]};
+                state.linkers.push_back(linker);
+                state.events.resize(system.types.size());
+                state.events[linker.type].bindings += 2;
+                any = true;
+            }
+        }
+    if (any)
+        state.knownTo = cylchain::KnownTo();
+    return any;
+}
+
+/** Of a branch that one of its linkers does not hold any more, let all go. They have numbers that follow each other. */
+bool CylinderChainBindingForceImpl::removeBrokenBranches() {
+    bool any = false;
+    for (int i = 0; i < owner.getNumBranchJoints(); i++) {
+        const cylchain::BranchJoint& joint = owner.getBranchJoint(i);
+        const size_t count = joint.types.size();
+        vector<cylchain::Linker>& linkers = state.linkers;
+        for (size_t broken = 0; broken < linkers.size(); broken++) {
+            // Types of a joint are of nothing else.
+            const size_t position = find(joint.types.begin(), joint.types.end(), linkers[broken].type)-
+                    joint.types.begin();
+            if (position == count || linkers[broken].pulls())
+                continue;
+            const uint32_t first = linkers[broken].number-position;
+            for (size_t k = broken >= count ? broken-count : 0; k < min(linkers.size(), broken+count); k++)
+                for (cylchain::HandPlace& hand : linkers[k].hands)
+                    if (linkers[k].number >= first && linkers[k].number < first+count && hand.isBound()) {
+                        hand = cylchain::HandPlace();
+                        state.events[linkers[k].type].unbindings++;
+                        any = true;
+                    }
+        }
+    }
+    if (any)
+        state.knownTo = cylchain::KnownTo();
+    return any;
 }
 
 unique_ptr<cylchain::Surroundings> CylinderChainBindingForceImpl::describeSurroundings(

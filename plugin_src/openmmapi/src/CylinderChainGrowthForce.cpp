@@ -247,6 +247,29 @@ int CylinderChainGrowthForce::addNucleator(double rate, int order, int monomers,
     return system.nucleators.size()-1;
 }
 
+void CylinderChainGrowthForce::setBranching(int index, double angle, double stiffness, double distance, double beyond,
+        const vector<int>& numbers) {
+    ASSERT_VALID_INDEX(index, system.nucleators);
+    requireOfGrowth(angle >= 0 && angle <= M_PI, "The angle of branches must be from 0 to pi");
+    for (double value : {stiffness, distance, beyond})
+        requireOfGrowth(isRate(value), "The stiffness and the lengths of branches cannot be negative and must be finite");
+    for (int number : numbers)
+        getOwn(number);
+    system.nucleators[index].mothers = numbers;
+    system.nucleators[index].branch = {angle, stiffness, distance, beyond};
+}
+
+void CylinderChainGrowthForce::getBranching(int index, double& angle, double& stiffness, double& distance,
+        double& beyond, vector<int>& numbers) const {
+    ASSERT_VALID_INDEX(index, system.nucleators);
+    const Nucleator& own = system.nucleators[index];
+    angle = own.branch.angle;
+    stiffness = own.branch.stiffness;
+    distance = own.branch.distance;
+    beyond = own.branch.beyond;
+    numbers = own.mothers;
+}
+
 void CylinderChainGrowthForce::getNucleatorParameters(int index, double& rate, int& order, int& monomers, int& region,
         vector<double>& parameters, Vec3& direction, vector<int>& numbers) const {
     ASSERT_VALID_INDEX(index, system.nucleators);

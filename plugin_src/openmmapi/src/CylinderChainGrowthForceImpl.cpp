@@ -200,7 +200,7 @@ void CylinderChainGrowthForceImpl::updateContextState(ContextImpl& context, bool
         number = growing[number];
     chains->haveGrown(context, numbers);
     for (CouplingForceImpl* coupling : couplings)
-        coupling->chainsHaveGrown(context, list, changes.cuts);
+        coupling->chainsHaveGrown(context, list, changes);
     const bool otherNodes = any_of(changes.chains.begin(), changes.chains.end(), [&] (int i) {
         return list.getNumNodes(growing[i]) != numNodes[i];
     });

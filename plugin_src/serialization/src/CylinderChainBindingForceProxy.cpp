@@ -40,6 +40,16 @@ static void write(const CylinderChainBindingForce& force, SerializationNode& nod
         anchors.createChildNode("Anchor").setIntProperty("particle", particle).setDoubleProperty("x", point[0])
                 .setDoubleProperty("y", point[1]).setDoubleProperty("z", point[2]);
     }
+    SerializationNode& joints = node.createChildNode("BranchJoints");
+    for (int i = 0; i < force.getNumBranchJoints(); i++) {
+        const cylchain::BranchJoint& joint = force.getBranchJoint(i);
+        StateColumns columns;
+        columns.put("nucleator", joint.nucleator);
+        columns.put("types", joint.types);
+        columns.put("onMother", joint.onMother);
+        columns.put("onBranch", joint.onBranch);
+        columns.write(joints.createChildNode("BranchJoint"));
+    }
     storeLinkers(force.getState()).write(node.createChildNode("Linkers"));
 }
 
@@ -75,6 +85,11 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
             force->addPointAnchor(Vec3(anchor.getDoubleProperty("x"), anchor.getDoubleProperty("y"),
                     anchor.getDoubleProperty("z")));
     }
+    for (auto& joint : node.getChildNode("BranchJoints").getChildren()) {
+        const StateColumns columns = StateColumns::read(joint);
+        force->addBranchJoint(columns.getOne<int>("nucleator"), columns.get<int>("types"),
+                columns.get<double>("onMother"), columns.get<double>("onBranch"));
+    }
     const LinkerColumns linkers(restoreLinkers(StateColumns::read(node.getChildNode("Linkers"))));
     force->setLinkers(linkers.numbers, linkers.types, linkers.anchors, linkers.chains, linkers.places,
             linkers.nextNumber);
@@ -82,4 +97,4 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
 }
 
 static const bool isBindingForceRegistered =
-        registerProxy<CylinderChainBindingForce>("CylinderChainBindingForce", 2, write, readBindingForce);
+        registerProxy<CylinderChainBindingForce>("CylinderChainBindingForce", 3, write, readBindingForce);

@@ -74,6 +74,11 @@ static void write(const CylinderChainGrowthForce& force, SerializationNode& node
         columns.put("parameters", parameters);
         columns.put("direction", vector<double> {direction[0], direction[1], direction[2]});
         columns.put("chains", members);
+        double angle, stiffness, distance, beyond;
+        vector<int> mothers;
+        force.getBranching(i, angle, stiffness, distance, beyond, mothers);
+        columns.put("mothers", mothers);
+        columns.put("branch", vector<double> {angle, stiffness, distance, beyond});
         columns.write(nucleators.createChildNode("Nucleator"));
     }
 }
@@ -106,9 +111,12 @@ static unique_ptr<CylinderChainGrowthForce> readGrowthForce(const SerializationN
     for (auto& nucleator : node.getChildNode("Nucleators").getChildren()) {
         const StateColumns columns = StateColumns::read(nucleator);
         const vector<double> direction = columns.get<double>("direction");
-        force->addNucleator(columns.getOne<double>("rate"), columns.getOne<int>("order"),
+        const vector<double> branch = columns.get<double>("branch");
+        const int index = force->addNucleator(columns.getOne<double>("rate"), columns.getOne<int>("order"),
                 columns.getOne<int>("monomers"), columns.getOne<int>("region"), columns.get<double>("parameters"),
                 Vec3(direction.at(0), direction.at(1), direction.at(2)), columns.get<int>("chains"));
+        force->setBranching(index, branch.at(0), branch.at(1), branch.at(2), branch.at(3),
+                columns.get<int>("mothers"));
     }
     return force;
 }

@@ -295,6 +295,30 @@ public:
         this->periodic = periodic;
     }
     /**
+     * Get the number of joints of branches.
+     */
+    int getNumBranchJoints() const {
+        return branchJoints.size();
+    }
+    /**
+     * Hold the chains that begin as branches by a nucleator of the CylinderChainGrowthForce: by a linker of each of some
+     * types, which have two hands, the first of them on the mother, and a concentration of zero.  When one of its
+     * linkers lets go, all do.
+     *
+     * @param nucleator   the index of the nucleator
+     * @param types       the types, which nothing else has
+     * @param parameters  where each holds the mother, beyond the place of the branch, measured in nm
+     * @param places      where each holds the branch, measured in nm
+     * @return the index of the joint that was added
+     */
+    int addBranchJoint(int nucleator, const std::vector<int>& types, const std::vector<double>& parameters,
+            const std::vector<double>& places);
+    /**
+     * Get a joint of branches, see addBranchJoint().
+     */
+    void getBranchJointParameters(int index, int& nucleator, std::vector<int>& types, std::vector<double>& parameters,
+            std::vector<double>& places) const;
+    /**
      * Get the linkers that every new Context begins with.  This is for internal use.
      */
     const cylchain::LinkerState& getState() const {
@@ -304,6 +328,12 @@ public:
      * Get the description of a kind of hands.  This is for internal use.
      */
     const cylchain::Hand& getHand(int hand) const;
+    /**
+     * Get the description of a joint of branches.  This is for internal use.
+     */
+    const cylchain::BranchJoint& getBranchJoint(int index) const {
+        return branchJoints[index];
+    }
     /**
      * Get the description of a type of linkers.  This is for internal use.
      */
@@ -319,6 +349,7 @@ private:
     std::vector<cylchain::Hand> hands;
     std::vector<cylchain::LinkerType> types;
     std::vector<cylchain::Place> anchors;
+    std::vector<cylchain::BranchJoint> branchJoints;
     cylchain::LinkerState state;
 };
 

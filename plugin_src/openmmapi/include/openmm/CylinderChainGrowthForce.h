@@ -161,6 +161,24 @@ public:
     int addNucleator(double rate, int order, int monomers, int region, const std::vector<double>& parameters,
             const Vec3& vector, const std::vector<int>& numbers);
     /**
+     * Let the chains of a nucleator begin as branches of others: its rate is that for each monomer of these, wherever
+     * they are in its region.
+     *
+     * @param index      the index of the nucleator
+     * @param angle      the angle between a branch and its mother, towards their plus ends, measured in radians
+     * @param stiffness  K of the energy K (theta-theta0)^2/2 by which angles differ, measured in kJ/mol
+     * @param distance   how far from the axis of the mother a branch begins, measured in nm
+     * @param beyond     how much of the mother must be there beyond the place, measured in nm
+     * @param numbers    the indices among those that grow of the mothers
+     */
+    void setBranching(int index, double angle, double stiffness, double distance, double beyond,
+            const std::vector<int>& numbers);
+    /**
+     * Get the branching of a nucleator, see setBranching(): it has no mothers if its chains are no branches.
+     */
+    void getBranching(int index, double& angle, double& stiffness, double& distance, double& beyond,
+            std::vector<int>& numbers) const;
+    /**
      * Get the parameters of a nucleator, see addNucleator().
      */
     void getNucleatorParameters(int index, double& rate, int& order, int& monomers, int& region,

@@ -3,6 +3,7 @@
 
 #include "dynamics/BrokenCoupling.h"
 #include "couplings/Surroundings.h"
+#include "growth/GrowthSystem.h"
 #include "networks/CoupledForces.h"
 #include "openmm/CylinderChainCoupling.h"
 #include "openmm/Vec3.h"
@@ -87,9 +88,9 @@ public:
     virtual void setSpareNodes(ContextImpl&, const std::vector<bool>&) {
     }
     /**
-     * Take note that chains have grown or shrunk, whether they have other nodes or not, or were cut.
+     * Take note that chains have grown or shrunk, whether they have other nodes or not, have begun, or were cut.
      */
-    virtual void chainsHaveGrown(ContextImpl&, const cylchain::ChainList&, const std::vector<cylchain::ChainCut>&) {
+    virtual void chainsHaveGrown(ContextImpl&, const cylchain::ChainList&, const cylchain::GrowthChanges&) {
     }
     /**
      * Describe it as the ends of chains feel it that grow; NULL if it cannot act on them.

@@ -58,7 +58,7 @@ public:
         return 1;
     }
     void chainsHaveGrown(ContextImpl& context, const cylchain::ChainList& chains,
-            const std::vector<cylchain::ChainCut>& cuts);
+            const cylchain::GrowthChanges& changes);
     std::unique_ptr<cylchain::Surroundings> describeSurroundings(const cylchain::ChainList& chains,
             const std::vector<int>& growing);
     std::string getStateName() const {
@@ -67,6 +67,8 @@ public:
     StateColumns storeState(bool inCheckpoint);
     void restoreState(const StateColumns& columns);
 private:
+    bool addBranches(const std::vector<cylchain::ChainBranch>& branches);
+    bool removeBrokenBranches();
     void follow() const;
     void accept();
     /**

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from openmm import unit
 
+from ..couplings.shapes import Box, Sphere
 from ..errors import InputError
 from ..units.quantities import (
     AVOGADRO,
@@ -23,9 +24,6 @@ from ..units.quantities import (
     whole_number,
 )
 from ..units.types import FloatArray, Scalar, Vector
-
-if TYPE_CHECKING:
-    from ..couplings.shapes import Box, Sphere
 
 _PER_VOLUME = RATE / VOLUME
 _MOLAR = unit.mole / unit.liter
@@ -83,8 +81,6 @@ class Nucleation:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        from ..couplings.shapes import Box, Sphere
-
         if not (self.region is None or isinstance(self.region, (Sphere, Box))):
             raise InputError(
                 f"The region of a Nucleation must be a Sphere, a Box or None, but is {shown(self.region)}."
@@ -123,8 +119,6 @@ class Nucleation:
     @property
     def described_region(self) -> tuple[int, list[float]]:
         """As a CylinderChainGrowthForce has it: 0, 1 or 2 for the box, a cuboid or a sphere, and its numbers."""
-        from ..couplings.shapes import Sphere
-
         if self.region is None:
             return 0, []
         if isinstance(self.region, Sphere):
