@@ -119,7 +119,8 @@ class EndStates:
         # From state 0 on: what is never reached has no share.
         shares = np.zeros(count)
         reached = _reached_from_first(leaving)
-        conditions = np.vstack([generator[np.ix_(reached, reached)].T, np.ones(len(reached))])
+        generator = generator[np.ix_(reached, reached)] / max(np.abs(generator).max(), 1e-300)
+        conditions = np.vstack([generator.T, np.ones(len(reached))])
         shares[reached] = np.linalg.lstsq(conditions, np.eye(len(reached) + 1)[-1], rcond=None)[0]
         return float(shares @ (on - off))
 
