@@ -10,17 +10,26 @@ Contours::Contours(const ChainList& list) {
 }
 
 void Contours::add(const Chain& own) {
-    Contour contour = {static_cast<int>(segments.size()), static_cast<int>(own.segments.size()), own.start, 0, 0,
+    Contour contour = {static_cast<int>(segments.size()), static_cast<int>(own.segments.size()), own.start, 0, 0, 0,
             own.closed};
-    bool same = true;
     for (size_t s = 0; s < own.segments.size(); s++) {
         const double length = own.segments[s].restLength;
         segments.push_back({getNumChains(), own.nodes[s], own.nodes[(s+1)%own.nodes.size()],
                 own.start+contour.length, length, {-1, -1}});
         contour.length += length;
-        same = same && length == own.segments[0].restLength;
     }
-    contour.ofSegments = same && !own.segments.empty() ? own.segments[0].restLength : 0;
+    const size_t count = own.segments.size();
+    auto areSame = [&] (size_t first, size_t last) {
+        return all_of(own.segments.begin()+first, own.segments.begin()+last, [&] (const Segment& segment) {
+            return segment.restLength == own.segments[first].restLength;
+        });
+    };
+    if (count > 0 && areSame(0, count))
+        contour.ofSegments = own.segments[0].restLength;
+    else if (count > 1 && areSame(1, max<size_t>(2, count-1))) {
+        contour.ofSegments = own.segments[1].restLength;
+        contour.ofFirst = own.segments[0].restLength;
+    }
     chains.push_back(contour);
 }
 
@@ -30,15 +39,16 @@ void Contours::add(const BeamChain& own) {
     for (int i = 0; i < elements; i++)
         segments.push_back({getNumChains(), own.particles[2*i], own.particles[(2*i+2)%particles], i*length, length,
                 {own.particles[2*i+1], own.particles[(2*i+3)%particles]}});
-    chains.push_back({static_cast<int>(segments.size())-elements, elements, 0, elements*length, length, own.closed});
+    chains.push_back({static_cast<int>(segments.size())-elements, elements, 0, elements*length, length, 0,
+            own.closed});
 }
 
 int Contours::findSegment(int chain, double position) const {
     const Contour& contour = chains[chain];
     int number;
+    const double along = min(position-contour.begin, contour.length)-contour.ofFirst;
     if (contour.ofSegments > 0)
-        number = position > contour.begin ?
-                static_cast<int>(min(position-contour.begin, contour.length)/contour.ofSegments) : 0;
+        number = along > 0 ? static_cast<int>(along/contour.ofSegments)+(contour.ofFirst > 0 ? 1 : 0) : 0;
     else {
         const auto first = segments.begin()+contour.firstSegment;
         number = upper_bound(first, first+contour.numSegments, position,

@@ -83,8 +83,10 @@ private:
     struct Contour {
         int firstSegment, numSegments;
         double begin, length;
-        /** The length of each segment if all are the same, or else zero. */
+        /** The length of each segment, or of each but those at ends, if these are the same, or else zero. */
         double ofSegments;
+        /** The length of the first one if it is another, or zero. */
+        double ofFirst;
         bool closed;
     };
     struct ContourSegment {

@@ -13,6 +13,7 @@
 #include <mutex>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <tuple>
 
@@ -25,6 +26,8 @@ namespace {
 const double LARGEST_FILLING = 0.2;
 /** The same of chains that have grown since they were put there. */
 const double LARGEST_FILLING_OF_GROWN = 0.5;
+/** Packs of chains that come and go have at most so many times the lanes of these, and so many packs besides. */
+const int MOST_LANES_OF_GROWN = 3, MOST_LANES_BESIDE = 16;
 
 const ChainKernels& kernels() {
     static const ChainKernels& best = loopsOfBest<baselineKernels, avx2Kernels, avx512Kernels>();
@@ -197,7 +200,7 @@ ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>
 
 /** The pieces of the chains of a pack that are few and long, or NULL. */
 unique_ptr<ChainPieces> piecesOf(const vector<Chain>& chains, const vector<int>& members) {
-    if (!ChainPieces::mayBeUsed(chains, members, kernels().wide.lanes))
+    if (members.empty() || !ChainPieces::mayBeUsed(chains, members, kernels().wide.lanes))
         return NULL;
     return make_unique<ChainPieces>(chains, members, kernels().lanes, kernels().wide.lanes);
 }
@@ -293,8 +296,15 @@ struct ChainEngine::Implementation {
     ModePacks modes;
     /** Those of each pack in double precision whose chains are few and long, or NULL. */
     vector<unique_ptr<ChainPieces> > pieces;
+    /** Whether chains come and go. All wide packs are used then, or none: where single precision is right for all. */
+    bool mayChange = false;
+    unique_ptr<WidePack> limits;
+    void findLimits(const vector<Chain>& chains);
     /** Held where wide packs and their tables are made. */
     mutex making;
+    vector<int> placeChains(const vector<Chain>& chains, const vector<int>& changed);
+    void fill(int pack, const vector<Chain>& chains, int lanes);
+    void addWide(const vector<Chain>& chains, int first, int last);
     bool isOfModes(int pack) const {
         return pack >= (int) (packs.size()+wide.size());
     }
@@ -311,7 +321,13 @@ struct ChainEngine::Implementation {
     }
 };
 
-ChainEngine::ChainEngine(const vector<Chain>& chains) : ChainEngine(chains, {}) {
+ChainEngine::ChainEngine(const vector<Chain>& chains, bool mayChange) : ChainEngine(chains, vector<PieceOfChain>()) {
+    if (!mayChange)
+        return;
+    implementation->mayChange = true;
+    for (unique_ptr<ChainPieces>& pieces : implementation->pieces)
+        pieces.reset();
+    implementation->findLimits(chains);
 }
 
 ChainEngine::ChainEngine(const vector<Chain>& chains, const vector<PieceOfChain>& origins) {
@@ -367,37 +383,21 @@ ChainEngine::~ChainEngine() {
 }
 
 bool ChainEngine::replaceChains(const vector<Chain>& chains, const vector<int>& changed) {
-    vector<char> isChanged(chains.size(), 0);
-    for (int chain : changed)
-        isChanged[chain] = 1;
     vector<vector<int> >& members = implementation->members;
-    vector<char> isInPack(chains.size(), 0);
-    vector<int> packs;
+    const vector<int> packs = implementation->placeChains(chains, changed);
+    size_t lanes = 0, taken = 0;
     for (size_t pack = 0; pack < members.size(); pack++) {
-        vector<int>& own = members[pack];
-        for (int chain : own)
-            isInPack[chain] = 1;
-        if (none_of(own.begin(), own.end(), [&] (int chain) {return isChanged[chain] != 0;}))
-            continue;
-        stable_sort(own.begin(), own.end(), [&] (int a, int b) {
-            return chains[a].nodes.size() > chains[b].nodes.size();
-        });
-        if (chains[own.back()].nodes.empty() ||
-                !mayShareLanes(chains[own[0]], chains[own.back()], LARGEST_FILLING_OF_GROWN))
-            return false;
-        packs.push_back(pack);
+        lanes += kernels().lanes;
+        taken += members[pack].size();
     }
-    for (int chain : changed)
-        if (!isInPack[chain] && !chains[chain].nodes.empty())
-            return false;
+    if (lanes > MOST_LANES_OF_GROWN*taken+MOST_LANES_BESIDE*kernels().lanes)
+        return false;
     // Tables of what has changed are its own, and those before are gone with it.
     implementation->tables = PropertyTables<double>();
     implementation->wideTables = PropertyTables<float>();
-    for (int pack : packs) {
-        implementation->packs[pack] = packed(chains, members[pack], implementation->packs[pack].lanes,
-                implementation->tables);
-        implementation->pieces[pack] = piecesOf(chains, members[pack]);
-    }
+    for (int pack : packs)
+        implementation->fill(pack, chains, max(implementation->packs[pack].lanes,
+                lanesFor(members[pack].size(), kernels().lanes)));
     for (WidePack& wide : implementation->wide) {
         if (none_of(packs.begin(), packs.end(), [&] (int pack) {return pack >= wide.first && pack < wide.last;}))
             continue;
@@ -406,7 +406,163 @@ bool ChainEngine::replaceChains(const vector<Chain>& chains, const vector<int>& 
             together.insert(together.end(), members[pack].begin(), members[pack].end());
         wide = WidePack(chains, together, wide.first, wide.last);
     }
+    implementation->findLimits(chains);
     return true;
+}
+
+/** Find the limits of all chains that may be in wide packs. */
+void ChainEngine::Implementation::findLimits(const vector<Chain>& chains) {
+    vector<int> all;
+    for (size_t i = 0; i < chains.size(); i++)
+        if (!chains[i].nodes.empty() && !chains[i].closed && !hasRange(chains[i].stretching))
+            all.push_back(i);
+    limits = make_unique<WidePack>(chains, all, 0, packs.size());
+}
+
+vector<int> ChainEngine::getArrangement() const {
+    vector<int> result = {getNumPacks()};
+    for (size_t pack = 0; pack < implementation->members.size(); pack++) {
+        const vector<int>& own = implementation->members[pack];
+        result.insert(result.end(), {implementation->packs[pack].lanes, static_cast<int>(own.size())});
+        result.insert(result.end(), own.begin(), own.end());
+    }
+    for (const WidePack& wide : implementation->wide)
+        result.insert(result.end(), {wide.first, wide.last});
+    return result;
+}
+
+void ChainEngine::setArrangement(const vector<Chain>& chains, const vector<int>& arrangement) {
+    size_t next = 0;
+    auto take = [&] {
+        return next < arrangement.size() ? arrangement[next++] : -1;
+    };
+    vector<vector<int> > members(max(0, take()));
+    vector<int> lanes, seen(chains.size(), 0);
+    bool isRight = true;
+    for (vector<int>& own : members) {
+        lanes.push_back(take());
+        for (int count = take(); count > 0; count--)
+            own.push_back(take());
+        isRight = isRight && lanes.back() >= 1 && lanes.back() <= kernels().lanes &&
+                static_cast<int>(own.size()) <= lanes.back();
+        for (int chain : own)
+            if (chain < 0 || chain >= static_cast<int>(chains.size()) || chains[chain].nodes.empty())
+                isRight = false;
+            else
+                seen[chain]++;
+        isRight = isRight && (own.empty() || mayShareLanes(chains[own.front()], chains[own.back()],
+                LARGEST_FILLING_OF_GROWN));
+    }
+    for (size_t i = 0; i < chains.size(); i++)
+        isRight = isRight && seen[i] == (chains[i].nodes.empty() ? 0 : 1);
+    vector<pair<int, int> > wide;
+    while (next < arrangement.size()) {
+        const int first = take(), last = take();
+        int ofBoth = 0;
+        for (int pack = first; pack < last && pack >= 0 && pack < static_cast<int>(lanes.size()); pack++)
+            ofBoth += lanes[pack];
+        isRight = isRight && first >= (wide.empty() ? 0 : wide.back().second) && first < last &&
+                last <= static_cast<int>(members.size()) && ofBoth <= kernels().wide.lanes;
+        wide.push_back({first, last});
+    }
+    // That of another processor, which has other lanes, has other digits anyway.
+    if (!isRight)
+        return;
+    implementation->tables = PropertyTables<double>();
+    implementation->wideTables = PropertyTables<float>();
+    implementation->members = members;
+    implementation->packs.clear();
+    implementation->pieces.clear();
+    implementation->wide.clear();
+    for (size_t pack = 0; pack < members.size(); pack++) {
+        implementation->packs.emplace_back();
+        implementation->pieces.emplace_back();
+        implementation->fill(pack, chains, lanes[pack]);
+    }
+    for (const pair<int, int>& own : wide)
+        implementation->addWide(chains, own.first, own.second);
+    implementation->findLimits(chains);
+}
+
+/** Make a pack of its members. */
+void ChainEngine::Implementation::fill(int pack, const vector<Chain>& chains, int lanes) {
+    if (!members[pack].empty()) {
+        packs[pack] = packed(chains, members[pack], lanes, tables);
+        return;
+    }
+    packs[pack] = packWithoutChains<double>({2, 1, {}, {}, false, false, false, true}, lanes);
+    PropertyRows<double>(2, lanes).giveTo(packs[pack], tables);
+}
+
+void ChainEngine::Implementation::addWide(const vector<Chain>& chains, int first, int last) {
+    vector<int> together;
+    for (int pack = first; pack < last; pack++)
+        together.insert(together.end(), members[pack].begin(), members[pack].end());
+    wide.emplace_back(chains, together, first, last);
+}
+
+/**
+ * Find packs for chains that have changed, so that those of a pack are of similar length.
+ *
+ * @return the packs that have other chains, or chains that have changed, in ascending order
+ */
+vector<int> ChainEngine::Implementation::placeChains(const vector<Chain>& chains, const vector<int>& changed) {
+    auto isLonger = [&] (int a, int b) {
+        return chains[a].nodes.size() > chains[b].nodes.size();
+    };
+    auto areSimilar = [&] (const vector<int>& own) {
+        return own.empty() || mayShareLanes(chains[own.front()], chains[own.back()], LARGEST_FILLING_OF_GROWN);
+    };
+    vector<char> isChanged(chains.size(), 0);
+    vector<int> homeless(changed);
+    for (int chain : changed)
+        isChanged[chain] = 1;
+    set<int> result;
+    for (size_t pack = 0; pack < members.size(); pack++) {
+        vector<int>& own = members[pack];
+        const auto others = stable_partition(own.begin(), own.end(), [&] (int chain) {return isChanged[chain] == 0;});
+        if (others == own.end())
+            continue;
+        result.insert(pack);
+        // Those that have changed stay, unless they are too different from those that have not.
+        const vector<int> back(others, own.end());
+        own.erase(others, own.end());
+        for (int chain : back) {
+            vector<int> with = own;
+            with.insert(upper_bound(with.begin(), with.end(), chain, isLonger), chain);
+            if (chains[chain].nodes.empty() || !areSimilar(with))
+                continue;
+            own.swap(with);
+            homeless.erase(find(homeless.begin(), homeless.end(), chain));
+        }
+    }
+    for (int chain : homeless) {
+        if (chains[chain].nodes.empty())
+            continue;
+        size_t pack = 0;
+        for (; pack < members.size(); pack++) {
+            vector<int> with = members[pack];
+            with.insert(upper_bound(with.begin(), with.end(), chain, isLonger), chain);
+            if (static_cast<int>(with.size()) <= kernels().lanes && areSimilar(with)) {
+                members[pack].swap(with);
+                break;
+            }
+        }
+        if (pack == members.size()) {
+            members.push_back({chain});
+            packs.emplace_back();
+            pieces.emplace_back();
+            if (!hasRange(chains[chain].stretching)) {
+                const int last = packs.size();
+                if (!wide.empty() && wide.back().last == last-1 && wide.back().first == last-2)
+                    wide.back().last = last;
+                else
+                    wide.emplace_back(chains, vector<int>(), last-1, last);
+            }
+        }
+        result.insert(pack);
+    }
+    return {result.begin(), result.end()};
 }
 
 int ChainEngine::getNumPacks() const {
@@ -426,7 +582,8 @@ vector<int> ChainEngine::getPacksOfStep(const StepSettings& settings) const {
     for (size_t wide = 0; wide < implementation->wide.size(); wide++) {
         WidePack& pack = implementation->wide[wide];
         const ChainPieces* const pieces = pack.last == pack.first+1 ? implementation->piecesOf(pack.first) : NULL;
-        if (!pack.isUsed(settings) || (pieces != NULL && pieces->isUsed(settings)))
+        const WidePack& limits = implementation->mayChange ? *implementation->limits : pack;
+        if (!limits.isUsed(settings) || (pieces != NULL && pieces->isUsed(settings)))
             continue;
         pack.make(implementation->packs, implementation->wideTables);
         for (; next < pack.first; next++)

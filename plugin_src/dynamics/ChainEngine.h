@@ -110,10 +110,12 @@ struct PieceOfChain {
 class ChainEngine {
 public:
     /**
-     * @param chains   the chains; no particle may be a node of two of them. A chain without models is refused, and one
-     *                 without nodes does nothing.
+     * @param chains     the chains; no particle may be a node of two of them. A chain without models is refused, and one
+     *                   without nodes does nothing.
+     * @param mayChange  whether replaceChains() may be called: results then depend on what chains are, and not on the
+     *                   packs in which they have come to be
      */
-    explicit ChainEngine(const std::vector<Chain>& chains);
+    explicit ChainEngine(const std::vector<Chain>& chains, bool mayChange = false);
     /**
      * Compute pieces of chains by the implicit schemes.
      *
@@ -123,13 +125,22 @@ public:
     ChainEngine(const std::vector<Chain>& chains, const std::vector<PieceOfChain>& origins);
     ~ChainEngine();
     /**
-     * Take over chains that have other nodes, segments and joints than before. Packs without such stay as they are.
+     * Take over chains that have other nodes, segments and joints than before, or have come or gone. Packs without such
+     * stay as they are.
      *
      * @param chains   all chains
      * @param changed  the numbers of those that are others
-     * @return whether it is done: if not, chains have become too different for their packs, and a new engine is needed
+     * @return whether it is done: if not, packs have become too many for what they hold, and a new engine is needed
      */
     bool replaceChains(const std::vector<Chain>& chains, const std::vector<int>& changed);
+    /**
+     * Describe in which packs chains have come to be, on which the last digits of results depend.
+     */
+    std::vector<int> getArrangement() const;
+    /**
+     * Let chains be in the packs that getArrangement() has described, if that can be.
+     */
+    void setArrangement(const std::vector<Chain>& chains, const std::vector<int>& arrangement);
     /**
      * Get the number of packs in double precision, which hold all chains.
      */

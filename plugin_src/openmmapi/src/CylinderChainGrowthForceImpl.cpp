@@ -37,7 +37,7 @@ static double digestOf(const GrowthState& state) {
 }
 
 CylinderChainGrowthForceImpl::CylinderChainGrowthForceImpl(const CylinderChainGrowthForce& owner) :
-        StepForceImpl(owner), owner(owner), context(NULL), chains(NULL), seed(0), hasCouplings(false) {
+        StepForceImpl(owner), owner(owner), context(NULL), chains(NULL), seed(0), hasCouplings(false), hasOtherForces(false) {
 }
 
 void CylinderChainGrowthForceImpl::initialize(ContextImpl& context) {
@@ -61,6 +61,7 @@ void CylinderChainGrowthForceImpl::initialize(ContextImpl& context) {
     if (seed == 0)
         seed = (uint32_t) osrngseed();
     state = owner.getState();
+    isSpare = findSpareNodes(system);
     growing.clear();
     for (const GrowingChain& own : owner.getSystem().chains)
         growing.push_back(own.chain);
@@ -124,6 +125,7 @@ void CylinderChainGrowthForceImpl::findCouplings() {
         return;
     for (ForceImpl* impl : context->getForceImpls()) {
         CouplingForceImpl* const coupling = dynamic_cast<CouplingForceImpl*>(impl);
+        hasOtherForces |= dynamic_cast<StepForceImpl*>(impl) == NULL;
         if (coupling == NULL)
             continue;
         couplings.push_back(coupling);
@@ -205,7 +207,7 @@ void CylinderChainGrowthForceImpl::updateContextState(ContextImpl& context, bool
         return list.getNumNodes(growing[i]) != numNodes[i];
     });
     if (otherNodes)
-        setSpareNodes();
+        setSpareNodes(numbers);
     forcesInvalid = true;
 }
 
@@ -217,17 +219,24 @@ double CylinderChainGrowthForceImpl::calcForcesAndEnergy(ContextImpl& context, b
     return 0.0;
 }
 
-void CylinderChainGrowthForceImpl::setSpareNodes() {
-    vector<bool> isSpare(context->getSystem().getNumParticles(), false);
-    for (int chain : growing)
-        for (int particle : chains->getDescription().getList().getChain(chain).spareNodes)
+/** Tell all what are no nodes of some of the chains that grow. */
+void CylinderChainGrowthForceImpl::setSpareNodes(const vector<int>& changed) {
+    isSpare.resize(context->getSystem().getNumParticles(), false);
+    for (int number : changed) {
+        const Chain& chain = chains->getDescription().getList().getChain(number);
+        for (int particle : chain.nodes)
+            isSpare[particle] = false;
+        for (int particle : chain.spareNodes)
             isSpare[particle] = true;
+    }
     findCouplings();
     for (CouplingForceImpl* coupling : couplings)
         coupling->setSpareNodes(*context, isSpare);
 }
 
 void CylinderChainGrowthForceImpl::refuseForces(const vector<Vec3>& forces) const {
+    if (!hasOtherForces)
+        return;
     const ChainList& list = chains->getDescription().getList();
     for (int number : growing)
         for (const vector<int>* particles : {&list.getChain(number).nodes, &list.getChain(number).spareNodes})
@@ -274,7 +283,7 @@ void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
     for (size_t i = 0; i < growing.size(); i++)
         cylchain::setMonomers(list.getChain(growing[i]), system.tables[system.chains[i].table], state.ranges[i]);
     chains->haveGrown(*context, growing);
-    setSpareNodes();
+    setSpareNodes(growing);
     for (CouplingForceImpl* coupling : couplings)
         coupling->chainsHaveGrown(*context, list, {});
     accept();
@@ -337,6 +346,7 @@ StateColumns CylinderChainGrowthForceImpl::storeState(bool inCheckpoint) {
             all.waited});
     columns.put("steps", now.steps);
     columns.put("time", now.time);
+    columns.put("packs", chains->getKernel().getAs<CalcCylinderChainForceKernel>().getArrangement());
     if (inCheckpoint)
         columns.put("seed", seed);
     return columns;
@@ -380,6 +390,8 @@ void CylinderChainGrowthForceImpl::restoreState(const StateColumns& columns) {
             nextMonomer++;
         }
     setState(replaced);
+    if (columns.has("packs"))
+        chains->getKernel().getAs<CalcCylinderChainForceKernel>().setArrangement(columns.get<int>("packs"));
     if (columns.has("seed"))
         seed = columns.getOne<uint32_t>("seed");
 }

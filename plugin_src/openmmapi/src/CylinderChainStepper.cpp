@@ -165,7 +165,7 @@ void CylinderChainStepper::refuseTornChains() const {
     for (int number = 0; number < chains.getList().size(); number++)
         chains.getList().visit(number, [&] (const auto& chain) {
             const vector<int>& particles = chain.getParticles();
-            const size_t count = particles.size(), parts = chain.closed ? count : count-1;
+            const size_t count = particles.size(), parts = chain.closed || count == 0 ? count : count-1;
             for (size_t i = 0; i < parts; i++) {
                 const Vec3 between = positions[particles[(i+1)%count]]-positions[particles[i]];
                 const double length = norm(between);

@@ -73,6 +73,17 @@ public:
      */
     virtual void replaceChains(ContextImpl&, const std::vector<int>&) {
     }
+    /**
+     * Describe how chains that have grown are arranged, on which the last digits of results depend.
+     */
+    virtual std::vector<int> getArrangement() {
+        return {};
+    }
+    /**
+     * Arrange chains as they were described to be, if that can be.
+     */
+    virtual void setArrangement(const std::vector<int>&) {
+    }
 };
 
 /**

@@ -22,6 +22,8 @@ public:
     void computeEnergies(ContextImpl& context, double& stretching, double& bending);
     void copyParametersToContext(ContextImpl& context);
     void replaceChains(ContextImpl& context, const std::vector<int>& changed);
+    std::vector<int> getArrangement();
+    void setArrangement(const std::vector<int>& arrangement);
     /**
      * Get the engine that computes with the present parameters of the chains.
      */

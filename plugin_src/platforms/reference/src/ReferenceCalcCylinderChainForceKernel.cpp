@@ -15,7 +15,7 @@ void ReferenceCalcCylinderChainForceKernel::initialize(const System&, const Cyli
 }
 
 void ReferenceCalcCylinderChainForceKernel::createEngines() {
-    engine.reset(new ChainEngine(chains->getChains()));
+    engine.reset(new ChainEngine(chains->getChains(), chains->anyGrow()));
     beamEngine.reset(new BeamEngine(chains->getBeams(), chains->getChains().size()));
 }
 
@@ -62,7 +62,16 @@ void ReferenceCalcCylinderChainForceKernel::computeEnergies(ContextImpl& context
 
 void ReferenceCalcCylinderChainForceKernel::replaceChains(ContextImpl&, const vector<int>& changed) {
     if (!engine->replaceChains(chains->getChains(), changed))
-        engine.reset(new ChainEngine(chains->getChains()));
+        engine.reset(new ChainEngine(chains->getChains(), true));
+    version++;
+}
+
+vector<int> ReferenceCalcCylinderChainForceKernel::getArrangement() {
+    return engine->getArrangement();
+}
+
+void ReferenceCalcCylinderChainForceKernel::setArrangement(const vector<int>& arrangement) {
+    engine->setArrangement(chains->getChains(), arrangement);
     version++;
 }
 

@@ -21,7 +21,6 @@ GrowthChanges ReferenceUpdateCylinderChainGrowthKernel::execute(ContextImpl& con
 void ReferenceUpdateCylinderChainGrowthKernel::placeSpareNodes(ContextImpl& context, const vector<Chain>& chains) {
     vector<Vec3>& positions = *extractData(context).positions;
     for (const Chain& chain : chains)
-        if (!chain.nodes.empty())
-            for (int spare : chain.spareNodes)
-                positions[spare] = positions[chain.nodes.back()];
+        for (int spare : chain.spareNodes)
+            positions[spare] = positions[chain.nodes.empty() ? chain.spareNodes[0] : chain.nodes.back()];
 }

@@ -22,6 +22,12 @@ public:
      */
     void update(const CylinderChainForce& force);
     /**
+     * Get whether any chains grow.
+     */
+    bool anyGrow() const {
+        return !growing.empty();
+    }
+    /**
      * Get all chains, so that those that grow may change.
      */
     cylchain::ChainList& getGrowingList() {

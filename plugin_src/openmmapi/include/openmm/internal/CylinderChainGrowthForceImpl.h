@@ -63,7 +63,7 @@ private:
     void setState(const cylchain::GrowthState& replaced);
     void findCouplings();
     void refusePlaces();
-    void setSpareNodes();
+    void setSpareNodes(const std::vector<int>& changed);
     const CylinderChainGrowthForce& owner;
     ContextImpl* context;
     CylinderChainForceImpl* chains;
@@ -83,6 +83,10 @@ private:
     std::vector<Felt> around;
     std::vector<std::pair<CouplingForceImpl*, long long> > others;
     bool hasCouplings;
+    // Whether other Forces than those of this plugin may act on chains, and which particles are no nodes now.
+
+    bool hasOtherForces;
+    std::vector<bool> isSpare;
 };
 
 } // namespace OpenMM
