@@ -12,6 +12,7 @@ from openmm import unit
 from ..errors import InputError
 from ..units.quantities import (
     AVOGADRO,
+    FORCE,
     LENGTH,
     NUMBER_DENSITY,
     RATE,
@@ -279,6 +280,12 @@ class Growth:
         ``Filaments.add_reserve``.
     severing : Severing, optional
         How it is cut at random.
+    deterministic : bool
+        Monomers come and go at regular times, k_on c - k_off in all per time, and not at random: filaments grow at a
+        constant speed.
+    growing_force : force, optional
+        F_g: where something is in its way, an end gains k_on c exp(-F/F_g) monomers under the load F = dV/length of a
+        monomer. That has an equilibrium for k_BT/length alone, which it is if not given.
 
     Raises
     ------
@@ -296,6 +303,8 @@ class Growth:
     minus_instability: DynamicInstability | TwoUnitCap | EndStates | None = None
     vanishes: bool = False
     severing: Severing | None = None
+    deterministic: bool = False
+    growing_force: float | None = None
 
     if TYPE_CHECKING:
 
@@ -312,6 +321,8 @@ class Growth:
             minus_instability: DynamicInstability | TwoUnitCap | EndStates | None = None,
             vanishes: bool = False,
             severing: Severing | None = None,
+            deterministic: bool = False,
+            growing_force: Scalar | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -323,7 +334,9 @@ class Growth:
             object.__setattr__(self, "shortest", positive(self.shortest, LENGTH, "shortest"))
             if self.shortest >= self.longest:
                 raise InputError(f"longest must exceed shortest, {self.shortest:g} nm, but is {self.longest:g} nm.")
-        for name in ("plus_capped", "minus_capped", "vanishes"):
+        if self.growing_force is not None:
+            object.__setattr__(self, "growing_force", positive(self.growing_force, FORCE, "growing_force"))
+        for name in ("plus_capped", "minus_capped", "vanishes", "deterministic"):
             true_or_false(getattr(self, name), name)
         for end in ("plus", "minus"):
             instability = getattr(self, f"{end}_instability")

@@ -382,7 +382,7 @@ ChainEngine::ChainEngine(const vector<Chain>& chains, const vector<PieceOfChain>
 ChainEngine::~ChainEngine() {
 }
 
-bool ChainEngine::replaceChains(const vector<Chain>& chains, const vector<int>& changed) {
+Replacement ChainEngine::replaceChains(const vector<Chain>& chains, const vector<int>& changed) {
     vector<vector<int> >& members = implementation->members;
     const vector<int> packs = implementation->placeChains(chains, changed);
     size_t lanes = 0, taken = 0;
@@ -391,13 +391,18 @@ bool ChainEngine::replaceChains(const vector<Chain>& chains, const vector<int>& 
         taken += members[pack].size();
     }
     if (lanes > MOST_LANES_OF_GROWN*taken+MOST_LANES_BESIDE*kernels().lanes)
-        return false;
+        return Replacement::Impossible;
     // Tables of what has changed are its own, and those before are gone with it.
     implementation->tables = PropertyTables<double>();
     implementation->wideTables = PropertyTables<float>();
-    for (int pack : packs)
-        implementation->fill(pack, chains, max(implementation->packs[pack].lanes,
-                lanesFor(members[pack].size(), kernels().lanes)));
+    Replacement result = Replacement::SameNodes;
+    for (int pack : packs) {
+        ChainPack<double>& own = implementation->packs[pack];
+        const vector<int> chainsBefore = own.chain, particlesBefore = own.particles;
+        implementation->fill(pack, chains, max(own.lanes, lanesFor(members[pack].size(), kernels().lanes)));
+        if (own.chain != chainsBefore || own.particles != particlesBefore)
+            result = Replacement::OtherNodes;
+    }
     for (WidePack& wide : implementation->wide) {
         if (none_of(packs.begin(), packs.end(), [&] (int pack) {return pack >= wide.first && pack < wide.last;}))
             continue;
@@ -407,7 +412,7 @@ bool ChainEngine::replaceChains(const vector<Chain>& chains, const vector<int>& 
         wide = WidePack(chains, together, wide.first, wide.last);
     }
     implementation->findLimits(chains);
-    return true;
+    return result;
 }
 
 /** Find the limits of all chains that may be in wide packs. */

@@ -97,6 +97,12 @@ struct PieceOfChain {
 };
 
 /**
+ * What has become of packs of which chains have changed: they hold the same nodes as before, or other ones; or they have
+ * become too many for what they hold, and a new engine is needed.
+ */
+enum class Replacement {SameNodes, OtherNodes, Impossible};
+
+/**
  * Forces and displacements of many chains. Chains are gathered into packs that are computed in the lanes of the
  * processor's vector registers; packs are independent, so they can be given to different threads, and no result
  * depends on which thread computes what.
@@ -130,9 +136,9 @@ public:
      *
      * @param chains   all chains
      * @param changed  the numbers of those that are others
-     * @return whether it is done: if not, packs have become too many for what they hold, and a new engine is needed
+     * @return what has become of the packs
      */
-    bool replaceChains(const std::vector<Chain>& chains, const std::vector<int>& changed);
+    Replacement replaceChains(const std::vector<Chain>& chains, const std::vector<int>& changed);
     /**
      * Describe in which packs chains have come to be, on which the last digits of results depend.
      */

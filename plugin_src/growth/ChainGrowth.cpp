@@ -1,4 +1,6 @@
 #include "growth/ChainGrowth.h"
+#include <algorithm>
+#include <cmath>
 
 using namespace cylchain;
 using namespace std;
@@ -71,18 +73,41 @@ bool ChainGrowth::takeTurns(GrowthState& state, const GrowthStep& step, Group& g
             }
         for (int nucleator : group.nucleators)
             population.listNucleation(state, nucleator, events);
-        double total = 0;
+        double total = 0, untilRegular = HUGE_VAL;
+        size_t regular = 0;
+        for (size_t i = 0; i < events.size(); i++) {
+            const GrowthEvent& event = events[i];
+            if (!event.isRegular) {
+                total += event.rate;
+                continue;
+            }
+            const double left = max(0.0, 1-state.phases[2*event.index+event.end])/event.rate;
+            if (left < untilRegular) {
+                untilRegular = left;
+                regular = i;
+            }
+        }
+        const double wait = min(untilRegular, total > 0 ? random.exponential()/total : HUGE_VAL);
+        const double passed = min(wait, step.stepSize-time);
         for (const GrowthEvent& event : events)
-            total += event.rate;
-        if (total <= 0)
+            if (event.isRegular)
+                state.phases[2*event.index+event.end] += event.rate*passed;
+        time += wait;
+        if (!(time < step.stepSize))
             return true;
-        time += random.exponential()/total;
-        if (time >= step.stepSize)
-            return true;
-        double chosen = random.uniform()*total;
         size_t next = 0;
-        while (next+1 < events.size() && chosen >= events[next].rate)
-            chosen -= events[next++].rate;
+        if (wait == untilRegular) {
+            next = regular;
+            state.phases[2*events[next].index+events[next].end] = 0;
+        }
+        else {
+            double chosen = random.uniform()*total, seen = 0;
+            for (size_t i = 0; i < events.size() && seen <= chosen; i++)
+                if (!events[i].isRegular) {
+                    seen += events[i].rate;
+                    next = i;
+                }
+        }
         const GrowthEvent event = events[next];
         if (event.kind == GrowthEvent::Gain || event.kind == GrowthEvent::Lose || event.kind == GrowthEvent::Switch) {
             ends.apply(state, event, state.time+time, step.kT, random, chains);

@@ -188,6 +188,7 @@ int ChainPopulation::nucleate(GrowthState& state, const GrowthStep& step, int nu
     returnMonomers(state, index, -nucleator.monomers);
     // Its monomers are new.
     state.endStates[2*index] = state.endStates[2*index+1] = 0;
+    state.phases[2*index] = state.phases[2*index+1] = 0;
     if (own.monomersHaveStates)
         state.monomers[index].assign(range.size(), {time, 0});
     state.identities[index] = state.nextIdentity++;
@@ -382,6 +383,8 @@ void ChainPopulation::setParts(GrowthState& state, int index, int part, int mono
         setPart(part, {monomer, before.last});
         state.endStates[2*part] = ofMinus;
         state.endStates[2*part+1] = plusState;
+        state.phases[2*part+1] = state.phases[2*index+1];
+        state.phases[2*part] = 0;
     }
     if (!stays[0] && !stays[1])
         clear(state, index);

@@ -1,5 +1,6 @@
 #include "growth/EndGrowth.h"
 #include "growth/MonomerStates.h"
+#include <algorithm>
 
 using namespace cylchain;
 using namespace std;
@@ -27,11 +28,18 @@ void EndGrowth::listEvents(const GrowthState& state, int index, vector<GrowthEve
         const EndState& now = own.ends[end].states[state.endStates[2*index+end]];
         auto add = [&] (GrowthEvent::Kind kind, double rate, int to) {
             if (rate > 0)
-                events.push_back({kind, index, rate, end, to});
+                events.push_back({kind, index, rate, end, to, own.ends[end].timing.isRegular &&
+                        kind != GrowthEvent::Switch});
         };
+        double gains = now.onRate*concentration, losses = now.offRate;
+        if (own.ends[end].timing.isRegular) {
+            const double both = min(gains, losses);
+            gains -= both;
+            losses -= both;
+        }
         if (state.ranges[index].size() > own.leastMonomers)
-            add(GrowthEvent::Lose, now.offRate, 0);
-        add(GrowthEvent::Gain, now.onRate*concentration, 0);
+            add(GrowthEvent::Lose, losses, 0);
+        add(GrowthEvent::Gain, gains, 0);
         for (size_t to = 0; to < now.switchRates.size(); to++)
             add(GrowthEvent::Switch, now.switchRates[to], to);
     }
@@ -88,7 +96,8 @@ void EndGrowth::apply(GrowthState& state, const GrowthEvent& event, double time,
     }
     const EndChange change = {own.chain, end, nodes, carried.nodes, carried.segmentsBefore, carried.segmentsAfter,
             alongBefore, alongAfter, carried.joint};
-    if (!chains.isTaken(chains.findChange(change), random))
+    const double ofLoad = event.kind == GrowthEvent::Gain ? own.ends[end].timing.energyOfLoad : 0;
+    if (!chains.isTaken(chains.findChange(change)*(ofLoad > 0 ? kT/ofLoad : 1), random))
         return;
     chains.show(index, carried.nodes, alongAfter);
     chains.set(index, carried.nodes);

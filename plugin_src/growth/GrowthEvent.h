@@ -13,6 +13,8 @@ struct GrowthEvent {
     double rate;
     /** The plus end (1) or the minus end (0), and the state to which it changes by itself. */
     int end = 0, to = 0;
+    /** Whether it happens at regular times. */
+    bool isRegular = false;
 };
 
 } // namespace cylchain

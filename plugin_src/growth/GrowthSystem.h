@@ -23,10 +23,22 @@ struct EndState {
     std::vector<double> switchRates;
 };
 
+/** How monomers come and go. */
+struct EndTiming {
+    /** Whether they do so at regular times, and not at random. */
+    bool isRegular = false;
+    /**
+     * Of those that come, the energy E in kJ/mol of the share exp(-dV/E) that what is around leaves of their rate; k_B T
+     * if it is zero.
+     */
+    double energyOfLoad = 0;
+};
+
 /** An end: its states, and that which it has at first. */
 struct GrowingEnd {
     std::vector<EndState> states = std::vector<EndState>(1);
     int initialState = 0;
+    EndTiming timing;
     bool grows() const {
         return std::any_of(states.begin(), states.end(), [] (const EndState& state) {
             return state.onRate > 0 || state.offRate > 0;
@@ -148,6 +160,8 @@ struct GrowthState {
     std::vector<MonomerRange> ranges;
     std::vector<EndEvents> events;
     std::vector<int> endStates;
+    /** Of each end at which monomers come and go at regular times, the share of the next one that has passed. */
+    std::vector<double> phases;
     /** Of each chain whose monomers have states, from the first to the last one. */
     std::vector<std::deque<MonomerState> > monomers;
     /** The monomers that are free, of each pool that is closed. */
@@ -167,6 +181,7 @@ struct GrowthState {
                 none.switches.resize(end.states.size());
                 events.push_back(none);
                 endStates.push_back(end.initialState);
+                phases.push_back(0);
             }
             if (own.monomersHaveStates)
                 monomers[i].assign(ranges[i].size(), {0, own.ends[1].initialState});

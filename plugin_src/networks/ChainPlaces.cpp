@@ -11,27 +11,37 @@ ChainPlaces::ChainPlaces(const vector<Chain>& chains, const vector<BeamChain>& b
         packOfChain(chains.size()+beams.size(), -1), laneOfChain(chains.size()+beams.size(), -1) {
     firstNodes.push_back(0);
     for (const Chain& chain : chains) {
-        const int number = lengths.size();
-        double length = 0;
-        for (const Segment& segment : chain.segments)
-            length += segment.restLength;
+        const int number = closed.size();
         for (size_t node = 0; node < chain.nodes.size(); node++) {
             chainOfParticle[chain.nodes[node]] = number;
             nodeOfParticle[chain.nodes[node]] = node;
-            // Places at the last node are on the segment before it.
-            const Segment& segment = chain.segments[min(node, chain.segments.size()-1)];
-            frictionOfNode.push_back(chain.nodeFriction+0.25*min(segment.parallel, segment.perpendicular));
         }
         particleOfNode.insert(particleOfNode.end(), chain.nodes.begin(), chain.nodes.end());
         firstNodes.push_back(particleOfNode.size());
         closed.push_back(chain.closed);
-        lengths.push_back(length);
     }
     for (size_t beam = 0; beam < beams.size(); beam++)
         for (size_t i = 0; i < beams[beam].particles.size(); i++) {
             chainOfParticle[beams[beam].particles[i]] = chains.size()+beam;
             nodeOfParticle[beams[beam].particles[i]] = i%2 == 0 ? i/2 : -1;
         }
+    updateLengths();
+}
+
+void ChainPlaces::updateLengths() {
+    lengths.clear();
+    frictionOfNode.clear();
+    for (const Chain& chain : chains) {
+        double length = 0;
+        for (const Segment& segment : chain.segments)
+            length += segment.restLength;
+        lengths.push_back(length);
+        for (size_t node = 0; node < chain.nodes.size(); node++) {
+            // Places at the last node are on the segment before it.
+            const Segment& segment = chain.segments[min(node, chain.segments.size()-1)];
+            frictionOfNode.push_back(chain.nodeFriction+0.25*min(segment.parallel, segment.perpendicular));
+        }
+    }
     findLeastFriction();
 }
 

@@ -106,6 +106,8 @@ public:
     int getNumChains() const {
         return getNumFilaments()+particles.size();
     }
+    /** Take note that segments have other lengths and friction, while nodes are the same. */
+    void updateLengths();
     /** The particles that move with a chain, or the one that is counted as one. */
     std::vector<int> getNodes(int chain) const;
 private:

@@ -31,6 +31,10 @@ public:
     NetworkStep(const ChainEngine& engine, const std::vector<Chain>& chains, const PackStepSource& beamEngine,
             const std::vector<BeamChain>& beams, int particles);
     ~NetworkStep();
+    /** Take note that segments have other lengths and friction, while nodes are the same. */
+    void updateLengths() {
+        places.updateLengths();
+    }
     /** Set the forces that steps have in their equations. What they point to must exist while steps are taken. */
     void setForces(const CoupledForces& forces);
     /**

@@ -248,6 +248,52 @@ static void testDynamicInstability() {
     }
 }
 
+/** Ends at which monomers come and go at regular times: as many as their speed says, whatever the step is. */
+static void testRegularTimes() {
+    for (double stepSize : {0.01, 0.37, 10.0}) {
+        mt19937_64 generator = generatorOf(6);
+        Growing all;
+        all.system.tables = {makeTable(false)};
+        all.system.pools = {{1, 0}};
+        const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
+        GrowingEnd plus = endOf(3.5, 1), minus = endOf(0.2, 0.7);
+        plus.timing.isRegular = minus.timing.isRegular = true;
+        for (int i = 0; i < 5; i++)
+            all.add(weights, {0, 60}, 20, minus, plus, generator);
+        ChainGrowth growth = all.makeGrowth();
+        const int steps = round(20/stepSize);
+        for (int i = 0; i < steps; i++)
+            all.advance(growth, stepSize, 3);
+        for (const MonomerRange& range : all.state.ranges) {
+            check(fabs(range.last-60-2.5*steps*stepSize) <= 1, "what a plus end gains");
+            check(fabs(range.first-0.5*steps*stepSize) <= 1, "what a minus end loses");
+        }
+    }
+}
+
+/** A rod that grows towards a wall with another share of the load: its speed is exp(-dV/E) of the free one. */
+static void testEnergyOfLoad() {
+    mt19937_64 generator = generatorOf(3);
+    Growing all;
+    all.system.tables = {makeTable(false, 0.0001)};
+    all.system.pools = {{1, 0}};
+    const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
+    GrowingEnd plus = endOf(1, 0);
+    plus.timing.energyOfLoad = 2*KT;
+    const int number = 4000;
+    for (int i = 0; i < number; i++)
+        all.add(weights, {0, 10}, 2, {}, plus, generator);
+    // The next monomer is 2 nm deep in it: 2 k_B T, of which E leaves exp(-1).
+    EndWalls wall({WallShape::Plane, {20, 0, 0}, {-1, 0, 0}, 0}, KT, Array(number, 0.0));
+    ChainGrowth growth = all.makeGrowth();
+    all.advance(growth, 0.5, 9, {&wall});
+    Mean gained;
+    for (const MonomerRange& range : all.state.ranges)
+        gained.add(range.last > 10);
+    checkClose(1-exp(-0.5*exp(-1.0)), gained.mean(), 4*gained.error(), 1, "the speed under a load");
+    check(gained.error() < 0.04*gained.mean(), "too few rods");
+}
+
 /** What comes to one chain does not depend on others. */
 static void testOrder() {
     const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
@@ -505,7 +551,7 @@ static void testRodInTheWay() {
 }
 
 int main() {
-    return runTests({testDivision, testFreeEnds, testRodBeforeWall, testPool, testDynamicInstability, testOrder,
+    return runTests({testDivision, testFreeEnds, testRodBeforeWall, testPool, testDynamicInstability, testRegularTimes, testEnergyOfLoad, testOrder,
             testContacts, testLinks,
             testRodInTheWay});
 }

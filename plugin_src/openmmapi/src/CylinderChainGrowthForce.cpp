@@ -153,6 +153,7 @@ void CylinderChainGrowthForce::setEndStates(int index, int end, int initialState
                 " cannot be negative and must be finite");
     GrowingEnd own;
     own.states.clear();
+    own.timing = chain.ends[end].timing;
     own.initialState = initialState;
     for (size_t i = 0; i < count; i++) {
         vector<double> rates(loads.begin()+i*count, loads.begin()+(i+1)*count);
@@ -176,6 +177,18 @@ void CylinderChainGrowthForce::getEndStates(int index, int end, int& initialStat
         loads.insert(loads.end(), state.switchRates.begin(), state.switchRates.end());
         loads.resize(numbers.size()/2*own.states.size(), 0);
     }
+}
+
+void CylinderChainGrowthForce::setEndTiming(int index, int end, bool isRegular, double energy) {
+    requireOfGrowth(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
+    requireOfGrowth(isRate(energy), "The energy of loads cannot be negative and must be finite");
+    getOwn(index).ends[end].timing = {isRegular, energy};
+}
+
+void CylinderChainGrowthForce::getEndTiming(int index, int end, bool& isRegular, double& energy) const {
+    requireOfGrowth(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
+    isRegular = getOwn(index).ends[end].timing.isRegular;
+    energy = getOwn(index).ends[end].timing.energyOfLoad;
 }
 
 void CylinderChainGrowthForce::setMonomersHaveStates(int index, bool monomersHaveStates) {

@@ -252,17 +252,18 @@ void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
     const GrowthSystem& system = owner.getSystem();
     const size_t count = growing.size();
     requireOfGrowing(replaced.ranges.size() == count && replaced.events.size() == 2*count &&
-            replaced.endStates.size() == 2*count && replaced.monomers.size() == count &&
+            replaced.endStates.size() == 2*count && replaced.phases.size() == 2*count && replaced.monomers.size() == count &&
             replaced.identities.size() == count && replaced.parents.size() == count &&
             replaced.free.size() == system.pools.size(), "A State or checkpoint has the growth of another number of "
             "chains or pools");
     ChainList& list = chains->getGrowingList();
+    const vector<MonomerRange> ofSystem = owner.getState().ranges;
     for (size_t i = 0; i < count; i++) {
         const MonomerRange& range = replaced.ranges[i];
         const GrowingChain& own = system.chains[i];
         const Chain& chain = list.getChain(growing[i]);
         const int most = chain.nodes.size()+chain.spareNodes.size();
-        const bool isNone = range.first == 0 && range.last == 0 && (own.vanishes || state.ranges[i].size() == 0);
+        const bool isNone = range.first == 0 && range.last == 0 && (own.vanishes || ofSystem[i].size() == 0);
         requireOfGrowing(isNone || (range.first < range.last && range.size() >= own.leastMonomers &&
                 SegmentDivision(range, system.tables[own.table].monomersPerSegment).countSegments() < most), "Chain "+
                 to_string(growing[i])+" cannot have monomers "+to_string(range.first)+" to "+to_string(range.last)+
@@ -337,6 +338,7 @@ StateColumns CylinderChainGrowthForceImpl::storeState(bool inCheckpoint) {
     columns.put("events", events);
     columns.put("switches", switches);
     columns.put("endStates", now.endStates);
+    columns.put("phases", now.phases);
     columns.put("monomerTimes", times);
     columns.put("monomerStates", states);
     columns.put("free", now.free);
@@ -368,6 +370,7 @@ void CylinderChainGrowthForceImpl::restoreState(const StateColumns& columns) {
     replaced.time = columns.getOne<double>("time");
     replaced.free = columns.get<long long>("free");
     replaced.endStates = columns.get<int>("endStates");
+    replaced.phases = columns.get<double>("phases");
     replaced.identities = columns.get<long long>("identities");
     replaced.parents = columns.get<long long>("parents");
     replaced.nextIdentity = population[0];

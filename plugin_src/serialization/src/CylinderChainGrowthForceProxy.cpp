@@ -55,6 +55,11 @@ static void write(const CylinderChainGrowthForce& force, SerializationNode& node
             columns.put("rates", rates);
             columns.put("statesAfter", next);
             columns.put("switchRates", switchRates);
+            bool isRegular;
+            double energyOfLoad;
+            force.getEndTiming(i, end, isRegular, energyOfLoad);
+            columns.put("isRegular", isRegular ? 1 : 0);
+            columns.put("energyOfLoad", energyOfLoad);
             columns.write(own.createChildNode("End"));
         }
     }
@@ -104,6 +109,8 @@ static unique_ptr<CylinderChainGrowthForce> readGrowthForce(const SerializationN
         for (auto& child : own.getChildren())
             if (child.getName() == "End") {
                 const StateColumns columns = StateColumns::read(child);
+                force->setEndTiming(index, end, columns.getOne<int>("isRegular") != 0,
+                        columns.getOne<double>("energyOfLoad"));
                 force->setEndStates(index, end++, columns.getOne<int>("initialState"), columns.get<double>("rates"),
                         columns.get<int>("statesAfter"), columns.get<double>("switchRates"));
             }
@@ -122,4 +129,4 @@ static unique_ptr<CylinderChainGrowthForce> readGrowthForce(const SerializationN
 }
 
 static const bool isGrowthForceRegistered =
-        registerProxy<CylinderChainGrowthForce>("CylinderChainGrowthForce", 1, write, readGrowthForce);
+        registerProxy<CylinderChainGrowthForce>("CylinderChainGrowthForce", 2, write, readGrowthForce);

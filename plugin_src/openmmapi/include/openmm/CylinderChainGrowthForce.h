@@ -114,6 +114,21 @@ public:
     void getEndStates(int index, int end, int& initialState, std::vector<double>& parameters,
             std::vector<int>& numbers, std::vector<double>& loads) const;
     /**
+     * Set how monomers come and go at an end.
+     *
+     * @param index      the index of the chain among those that grow
+     * @param end        the minus end (0) or the plus end (1)
+     * @param isRegular  whether they do so at regular times, as many as would be gained and lost on the average, and
+     *                   not at random
+     * @param stiffness  of those that come, the energy E of the share exp(-dV/E) that what is around leaves of their
+     *                   rate, measured in kJ/mol; k_B T if it is zero, which alone has an equilibrium
+     */
+    void setEndTiming(int index, int end, bool isRegular, double stiffness);
+    /**
+     * Get how monomers come and go at an end, see setEndTiming().
+     */
+    void getEndTiming(int index, int end, bool& isRegular, double& stiffness) const;
+    /**
      * Let the states of the ends of a chain be those of the monomers there.  Monomers inside change as they would at the
      * plus end, and have the state then that they have come to when they are at an end again.
      *

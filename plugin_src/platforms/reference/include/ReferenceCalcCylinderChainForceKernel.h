@@ -37,10 +37,16 @@ public:
         return *beamEngine;
     }
     /**
-     * Get a number that increases whenever the engine is another one.
+     * Get a number that increases whenever the engine is another one, or has other nodes.
      */
     int getEngineVersion() const {
         return version;
+    }
+    /**
+     * Get a number that increases whenever segments alone are others.
+     */
+    int getVersionOfLengths() const {
+        return versionOfLengths;
     }
     /**
      * Get the chains.
@@ -66,7 +72,7 @@ private:
     const CylinderChainDescription* chains;
     std::unique_ptr<cylchain::ChainEngine> engine;
     std::unique_ptr<cylchain::BeamEngine> beamEngine;
-    int version = 0;
+    int version = 0, versionOfLengths = 0;
 };
 
 } // namespace OpenMM

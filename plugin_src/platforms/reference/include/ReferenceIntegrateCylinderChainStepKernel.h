@@ -51,7 +51,7 @@ private:
     // Takes the steps of coupled chains, once there have been some, with the version of the engine that it knows.
 
     std::unique_ptr<cylchain::NetworkStep> network;
-    int versionOfNetwork;
+    int versionOfNetwork, versionOfLengths;
     int mixedChains, unstableParticle = -1;
     std::vector<Vec3> displacements, newPositions;
 };

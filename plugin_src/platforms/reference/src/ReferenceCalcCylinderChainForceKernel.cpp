@@ -61,9 +61,10 @@ void ReferenceCalcCylinderChainForceKernel::computeEnergies(ContextImpl& context
 }
 
 void ReferenceCalcCylinderChainForceKernel::replaceChains(ContextImpl&, const vector<int>& changed) {
-    if (!engine->replaceChains(chains->getChains(), changed))
+    const Replacement replacement = engine->replaceChains(chains->getChains(), changed);
+    if (replacement == Replacement::Impossible)
         engine.reset(new ChainEngine(chains->getChains(), true));
-    version++;
+    (replacement == Replacement::SameNodes ? versionOfLengths : version)++;
 }
 
 vector<int> ReferenceCalcCylinderChainForceKernel::getArrangement() {

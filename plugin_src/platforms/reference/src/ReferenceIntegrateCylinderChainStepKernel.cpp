@@ -21,7 +21,7 @@ static bool isFinite(const Vec3& v) {
 
 ReferenceIntegrateCylinderChainStepKernel::ReferenceIntegrateCylinderChainStepKernel(string name,
         const Platform& platform, ContextImpl& context) : IntegrateCylinderChainStepKernel(name, platform),
-        loop(context), chainKernel(NULL), others(NULL), versionOfNetwork(-1), mixedChains(0) {
+        loop(context), chainKernel(NULL), others(NULL), versionOfNetwork(-1), versionOfLengths(-1), mixedChains(0) {
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system, const CylinderChainDescription&,
@@ -91,6 +91,9 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceCoupledChains(Con
                 context.getSystem().getNumParticles()));
         versionOfNetwork = chainKernel->getEngineVersion();
     }
+    else if (versionOfLengths != chainKernel->getVersionOfLengths())
+        network->updateLengths();
+    versionOfLengths = chainKernel->getVersionOfLengths();
     network->setForces(coupled);
     Instability result;
     loop.runMany([&] (const Loop& loops) {
