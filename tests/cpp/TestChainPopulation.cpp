@@ -313,7 +313,7 @@ static void testSevering() {
         if (cut.chain < number)
             firstCuts[cut.chain]++;
     }
-    Mean bends, lengths, gaps;
+    Mean bends, lengths;
     Mean places;
     for (const ChainCut& cut : changes.cuts)
         places.add(cut.along/MONOMER);
