@@ -265,7 +265,7 @@ void CylinderChainGrowthForce::setBranching(int index, double angle, double stif
     ASSERT_VALID_INDEX(index, system.nucleators);
     requireOfGrowth(angle >= 0 && angle <= M_PI, "The angle of branches must be from 0 to pi");
     for (double value : {stiffness, distance, beyond})
-        requireOfGrowth(isRate(value), "The stiffness and the lengths of branches cannot be negative and must be finite");
+        requireOfGrowth(isRate(value), "The stiffness and lengths of branches cannot be negative and must be finite");
     for (int number : numbers)
         getOwn(number);
     system.nucleators[index].mothers = numbers;

@@ -37,7 +37,8 @@ static double digestOf(const GrowthState& state) {
 }
 
 CylinderChainGrowthForceImpl::CylinderChainGrowthForceImpl(const CylinderChainGrowthForce& owner) :
-        StepForceImpl(owner), owner(owner), context(NULL), chains(NULL), seed(0), hasCouplings(false), hasOtherForces(false) {
+        StepForceImpl(owner), owner(owner), context(NULL), chains(NULL), seed(0), hasCouplings(false),
+        hasOtherForces(false) {
 }
 
 void CylinderChainGrowthForceImpl::initialize(ContextImpl& context) {
