@@ -253,7 +253,8 @@ void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
     const GrowthSystem& system = owner.getSystem();
     const size_t count = growing.size();
     requireOfGrowing(replaced.ranges.size() == count && replaced.events.size() == 2*count &&
-            replaced.endStates.size() == 2*count && replaced.phases.size() == 2*count && replaced.monomers.size() == count &&
+            replaced.endStates.size() == 2*count && replaced.phases.size() == 2*count &&
+            replaced.monomers.size() == count &&
             replaced.identities.size() == count && replaced.parents.size() == count &&
             replaced.free.size() == system.pools.size(), "A State or checkpoint has the growth of another number of "
             "chains or pools");

@@ -301,8 +301,8 @@ public:
         return branchJoints.size();
     }
     /**
-     * Hold the chains that begin as branches by a nucleator of the CylinderChainGrowthForce: by a linker of each of some
-     * types, which have two hands, the first of them on the mother, and a concentration of zero.  When one of its
+     * Hold the chains that begin as branches by a nucleator of the CylinderChainGrowthForce: by a linker of each of
+     * some types, which have two hands, the first of them on the mother, and a concentration of zero.  When one of its
      * linkers lets go, all do.
      *
      * @param nucleator   the index of the nucleator
