@@ -92,7 +92,7 @@ bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& 
                 stayOnChain(linker, side, count);
             else
                 unbind(linker, side, nullptr, count);
-            any = any || place.chain != before.chain || !linker.hands[side].isBound() || linker.hands[side].position != before.position;
+            any = any || place.chain != before.chain || place.position != before.position;
         }
     for (size_t type = 0; type < system.types.size(); type++)
         state.events[type].unbindings += count.events[type].unbindings;

@@ -101,7 +101,7 @@ static void testNucleation() {
         checkNucleation(stepSize);
 }
 
-/** What begins in a closed pool takes its monomers, and the law of mass action holds: J (n)_4/k for any other number. */
+/** What begins in a closed pool takes its monomers, and the law of mass action holds. */
 static void testPool() {
     // Nuclei of four monomers, which neither grow nor shrink but vanish.
     const double atFirst = 60, rate = 2, off = 1;
