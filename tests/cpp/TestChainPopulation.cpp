@@ -215,7 +215,8 @@ static void testContactsOfWhole() {
         EndContacts contacts(bodies, {0, -1, -1, -1, -1, 5}, 7, false);
         contacts.begin(x.data(), chains, NULL);
         const vector<Vec3d> start = {nodes[0]};
-        const EndChange begins = {5, 1, start, nodes, 0, 2, {}, {}, 1}, vanishes = {5, 1, nodes, start, 2, 0, {}, {}, 1};
+        const EndChange begins = {5, 1, start, nodes, 0, 2, {}, {}, 1};
+        const EndChange vanishes = {5, 1, nodes, start, 2, 0, {}, {}, 1};
         const double expected = energyOf(6)-energyOf(5);
         touching += expected > 0;
         checkClose(expected, contacts.findChange(begins), 1+expected, 1e-9, "the contacts of what begins");
@@ -257,7 +258,8 @@ static void testSeveringLengths() {
         GrowingEnd minus;
         minus.states = {{0, 0, 0, 0, {}}, {0, 1e6, 1, 1, {}}};
         for (int i = 0; i < 2*number; i++) {
-            all.add(WEIGHTS, i < number ? MonomerRange {0, 125} : MonomerRange {}, 100, minus, endOf(speed, 0), generator);
+            all.add(WEIGHTS, i < number ? MonomerRange {0, 125} : MonomerRange {}, 100, minus, endOf(speed, 0),
+                    generator);
             GrowingChain& own = all.system.chains[i];
             own.severing = {rate, {}, 1, 0};
             own.leastMonomers = least;

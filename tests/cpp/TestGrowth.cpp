@@ -545,7 +545,6 @@ static void testRodInTheWay() {
 }
 
 int main() {
-    return runTests({testDivision, testFreeEnds, testRodBeforeWall, testPool, testDynamicInstability, testRegularTimes, testEnergyOfLoad, testOrder,
-            testContacts, testLinks,
-            testRodInTheWay});
+    return runTests({testDivision, testFreeEnds, testRodBeforeWall, testPool, testDynamicInstability, testRegularTimes,
+            testEnergyOfLoad, testOrder, testContacts, testLinks, testRodInTheWay});
 }
