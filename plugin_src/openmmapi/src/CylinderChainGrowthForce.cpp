@@ -160,7 +160,7 @@ void CylinderChainGrowthForce::setEndStates(int index, int end, int initialState
         requireOfGrowth(rates[i] == 0, "No state can change to itself");
         own.states.push_back({parameters[2*i], parameters[2*i+1], numbers[2*i], numbers[2*i+1], rates});
     }
-    chain.ends[end] = own;
+    chain.ends[end] = move(own);
 }
 
 void CylinderChainGrowthForce::getEndStates(int index, int end, int& initialState, vector<double>& parameters,
