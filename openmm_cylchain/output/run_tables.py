@@ -164,8 +164,8 @@ GROWTH_TABLE_COLUMNS = (
     "parent",
     *POPULATION_COLUMNS,
 )
-"""A line per report and place of a filament that grows, without nodes while there is none; ends are where they are since
-it began, in monomers along the filament, and have waited so often because there was no spare node."""
+"""A line per report and place of a filament that grows, without nodes while there is none; ends are where they are
+since it began, in monomers along the filament, and have waited so often because there was no spare node."""
 
 
 _MEAN_FORCE_COLUMNS = (

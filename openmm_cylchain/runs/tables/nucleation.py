@@ -24,7 +24,7 @@ _WHICH = (
         "count",
         Whole(1, MOST_NODES, "100"),
         REQUIRED,
-        "How many places there are for them: so many can be there at once. One that vanishes leaves its place to others.",
+        "How many places there are for them: so many can be there at once. One that vanishes leaves its place.",
     ),
 )
 _OF_NEW_ONES = (
@@ -97,7 +97,7 @@ BRANCHING = TableKind(
             "distance",
             Quantity(units.LENGTH, "zero"),
             None,
-            "From the axis of the mother to the first node: with [contacts] their diameter, otherwise zero, if not given.",
+            "From the axis of the mother to the first node; with [contacts] their diameter, or zero, if not given.",
         ),
         Key("debranching_rate", Quantity(units.RATE, "zero"), None, "At which a branch lets go; never if not given."),
         Key("debranching_force", Quantity(units.FORCE), None, "Force that makes it let go e times as often."),
