@@ -16,6 +16,7 @@ from .summary import group_labels, mean_over_filaments
 ENDS = ("plus", "minus")
 _SECOND = 1e12
 """In ps."""
+_ROUNDING = 1e-12
 MICROMOLAR = 1e-6 * AVOGADRO * 1e-24
 """In 1/nm^3."""
 
@@ -163,7 +164,8 @@ def _ratio(upper, lower):
     if mean == 0.0:
         return float("nan"), float("nan")
     ratio = float(upper.mean()) / mean
-    return ratio, mean_with_error(upper - ratio * lower)[1] / mean if len(upper) > 1 else float("nan")
+    error = mean_with_error(upper - ratio * lower)[1] / mean if len(upper) > 1 else float("nan")
+    return ratio, 0.0 if error < _ROUNDING * abs(ratio) else error
 
 
 def populations(configuration, members):

@@ -165,7 +165,7 @@ def _population(population):
     counts = (("began", population.nucleated), ("vanished", population.vanished), ("were cut", population.severed))
     yield f"  In all of it, {', '.join(f'{count} {what}' for what, count in counts)}."
     if population.branches is not None:
-        yield f"  {population.branches} branches are on mothers at the end."
+        yield f"  At the end, {population.branches} of them hold on to mothers as branches."
     if population.without_place:
         yield (
             f"  {population.without_place} more would have begun or been cut, but there was no place for them: give "

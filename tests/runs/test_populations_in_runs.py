@@ -14,6 +14,7 @@ from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.initial_state import build_system
 from openmm_cylchain.runs.run import create_simulation
 from openmm_cylchain.runs.steady_populations import steady_population
+from openmm_cylchain.scans.quantities import read_quantities
 from support.configurations import COMING_AND_GOING
 from support.run_figures import rendered
 
@@ -268,6 +269,9 @@ def test_summary_says_what_comes_and_goes(directory, capsys):
     assert actin["number"] == pytest.approx((there > 0).sum() / len(there))
     assert actin["length"] == pytest.approx(lengths.sum() / (there > 0).sum()) and actin["length_error"] > 0.0
     assert actin["number_of_free_ones"] is None and mine["number_of_free_ones"] is None
+    gathered = {(one.of, one.name): one for one in read_quantities(directory / "summary.json")}
+    found = gathered["all MT of [[filament]] number 2", "filaments at once"]
+    assert (found.value, found.theory) == (tubes["number"], tubes["number_of_free_ones"])
     # Fifty begin in a second, and live as the master equation has them.
     assert tubes["number_of_free_ones"] == pytest.approx(15.2, rel=0.01)
     rates = {one["name"]: one["rate"] for one in json.loads((directory / "summary.json").read_text())["growth"]}
@@ -288,5 +292,5 @@ def test_runs_say_that_there_was_no_place(directory, tmp_path, capsys):
     assert main(["run", str(tmp_path / "few.toml"), "--output", str(tmp_path / "few")]) == 0
     said = capsys.readouterr().out
     assert re.search(r"In all of it, \d+ began, \d+ vanished, \d+ were cut\.", said)
-    assert re.search(r"\d+ branches are on mothers at the end", said)
+    assert re.search(r"At the end, \d+ of them hold on to mothers as branches", said)
     assert re.search(r"\d+ more would have begun or been cut, but there was no place .* larger count, or reserve", said)
