@@ -24,7 +24,8 @@ def steady_population(groups, box, concentration):
     """The SteadyPopulation of the FilamentGroups of one growth.
 
     From the master equation of the monomers of a filament and of the states of its ends, from its beginning until it
-    vanishes. None where there is none, or where more than these decide: branches, cuts, or monomers that age.
+    vanishes. None where there is none, or where more than these decide: branches, cuts, monomers that age, or that come
+    at regular times.
 
     Parameters
     ----------
@@ -35,7 +36,7 @@ def steady_population(groups, box, concentration):
     """
     growth, kind = groups[0].growth, groups[0].type
     nucleations = [group.nucleation for group in groups if group.nucleation is not None]
-    alone = growth.vanishes and growth.severing is None and not growth.monomers.aging
+    alone = growth.vanishes and not (growth.deterministic or growth.severing or growth.monomers.aging)
     if not (alone and nucleations) or any(isinstance(own, Branching) for own in nucleations):
         return None
     fewest = growth.fewest_monomers(kind)

@@ -7,12 +7,21 @@ import numpy as np
 import pytest
 from openmm import unit
 
-from openmm_cylchain import ACTIN_AGING, Branching, InputError, MonomerState, Nucleation, Severing, TwoUnitCap
+from openmm_cylchain import (
+    ACTIN_AGING,
+    Branching,
+    InputError,
+    MonomerState,
+    Nucleation,
+    Severing,
+    TwoUnitCap,
+    analysis,
+)
 from openmm_cylchain.cli import main
 from openmm_cylchain.output.read_tables import read_reports
 from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.initial_state import build_system
-from openmm_cylchain.runs.run import create_simulation
+from openmm_cylchain.runs.run import create_simulation, run
 from openmm_cylchain.runs.steady_populations import steady_population
 from openmm_cylchain.scans.quantities import read_quantities
 from support.configurations import COMING_AND_GOING
@@ -77,6 +86,13 @@ def test_growth_has_all_that_python_has():
     assert own.monomers.aging == (old,)
 
 
+def test_growth_may_be_steady_and_feel_loads_otherwise():
+    own = GROWTH.replace("}", ', deterministic = true, growing_force = "2 pN" }')
+    growth = parse(filament=FILAMENT + own).filaments[0].growth
+    assert growth.deterministic and growth.growing_force == pytest.approx(2 * 0.602214076)
+    assert not parse().filaments[0].growth.deterministic and parse().filaments[0].growth.growing_force is None
+
+
 def test_a_run_may_begin_without_filaments():
     own = '[[nucleation]]\ntype = "F_ACTIN"\nsegment_length = "54 nm"\ncount = 5\ntotal_rate = "3 1/s"\n'
     configuration = parse(own + INSIDE + GROWTH, filament="")
@@ -87,6 +103,21 @@ def test_a_run_may_begin_without_filaments():
     own = own.replace('total_rate = "3 1/s"', 'rate = "1 nM/s"')
     (group,) = parse(box, own + GROWTH, filament="").filaments
     assert 1e12 * group.nucleation.whole_rate(np.diag([2000.0, 2000.0, 1000.0])) == pytest.approx(4e9 * 6.02214076e-10)
+
+
+def test_they_begin_anywhere_in_a_periodic_box(tmp_path):
+    """As many as the rate times the volume and the time, with first nodes all over the box."""
+    box = '[box]\nedges = ["2 um", "2 um", "1 um"]\n'
+    growth = 'growth = { longest = "1 um", shortest = "432 nm" }\n'
+    own = '[[nucleation]]\ntype = "F_ACTIN"\nsegment_length = "108 nm"\ncount = 200\nrate = "400 1/(um^3*s)"\n'
+    configuration = parse(box, own + growth, filament="")
+    run(configuration, tmp_path / "out")
+    table, trajectory = read_reports(tmp_path / "out" / "growth.csv"), analysis.load(tmp_path / "out")
+    nucleated = table["filaments nucleated"][-1, 0]
+    assert abs(nucleated - 160) < 4 * np.sqrt(160)
+    firsts = trajectory.positions(-1)[[own.nodes[0] for own in trajectory.filaments]][table["nodes"][-1] > 0]
+    shares = np.mod(firsts, [2000.0, 2000.0, 1000.0]) / [2000.0, 2000.0, 1000.0]
+    assert np.all(np.abs(shares.mean(axis=0) - 0.5) < 4 * np.sqrt(1 / 12 / nucleated))
 
 
 @pytest.mark.parametrize(
@@ -185,6 +216,7 @@ def test_numbers_in_the_long_run_are_those_of_mass_action():
     z = on / off
     assert steady.number == pytest.approx(0.5 / off / (1.0 - z), rel=1e-9)
     assert steady.length == pytest.approx((growth.fewest_monomers(growth_type()) + z / (1.0 - z)) * 2.7, rel=1e-9)
+    assert _steady(GROWTH.replace("true", "true, deterministic = true"), nucleation)[2] is None
     # Above the concentration at which they treadmill, they become as long as they may, and there is no such number.
     assert _steady(GROWTH, nucleation, "0.2 uM")[2] is None
     assert _steady(GROWTH.replace("vanishes = true", "vanishes = false"), nucleation)[2] is None

@@ -21,6 +21,7 @@ PRESETS = {"ACTIN_ATP": ACTIN_ATP, "ACTIN_AGING": ACTIN_AGING, "TUBULIN": TUBULI
 _RATES = ("plus_on_rate", "plus_off_rate", "minus_on_rate", "minus_off_rate")
 _INSTABILITY = ("catastrophe_rate", "rescue_rate", "shrinking_off_rate")
 _CAP = ("hydrolysis_rate", "rescue_rate", "shrinking_off_rate")
+_OF_GROWTH = ("longest", "shortest", "plus_capped", "minus_capped", "deterministic", "growing_force", "vanishes")
 GROWTH_EXAMPLE = '{ longest = "5 um" }'
 SEVERING_EXAMPLE = '{ longest = "5 um", severing_rate = "0.01 1/(um*s)" }'
 
@@ -109,6 +110,19 @@ GROWTH = TableKind(
             "At which it begins to grow again; with hydrolysis_rate zero if not given.",
         ),
         Key("shrinking_off_rate", Quantity(units.RATE, "zero"), None, "How many monomers it loses while it shrinks."),
+        Key(
+            "deterministic",
+            Flag(),
+            False,
+            "Whether monomers come and go at regular times, so that filaments grow at a constant speed.",
+        ),
+        Key(
+            "growing_force",
+            Quantity(units.FORCE),
+            None,
+            "F_g of the rate k_on c exp(-F/F_g) under the load F; kT over the length of a monomer, which has an "
+            "equilibrium, if not given.",
+        ),
         Key("vanishes", Flag(), False, "Whether a filament of the shortest length vanishes with its next monomer."),
         Key(
             "severing_rate",
@@ -203,7 +217,7 @@ def read_growth(entries, monomers):
             pool=found[0].pool,
             plus_instability=_instability(entries),
             severing=_severing(entries),
-            **{name: entries[name] for name in ("longest", "shortest", "plus_capped", "minus_capped", "vanishes")},
+            **{name: entries[name] for name in _OF_GROWTH},
         )
 
 
