@@ -126,7 +126,7 @@ class Network:
         return int(np.maximum(self.filaments.in_context(self.context).growth().nodes - 1, 0).sum())
 
     def events(self):
-        """Monomers that have come and gone; filaments that have begun, vanished and were cut: (2,) of since ever."""
+        """Since the start: monomers that have come and gone; filaments that have begun, vanished and were cut: (2,)."""
         growth = self.filaments.in_context(self.context).growth()
         monomers = int(growth.gained.sum() + growth.lost.sum())
         return np.array([monomers, growth.nucleated + growth.vanished + growth.severed])
@@ -195,6 +195,7 @@ def benchmark_turnover(effort=FULL, say=lambda message: None):
     network = create_network(system, longest)
     recommended = network.filaments.recommended_time_step(system=network.context.getSystem()).step / MICROSECOND
     network.advance(round(effort.duration / longest))
+    monomers, filaments = network.events() / (1e-6 * effort.duration)
     networks = {
         "turnover": network,
         "growth_alone": create_network(system, longest, linked=False),
@@ -204,11 +205,6 @@ def benchmark_turnover(effort=FULL, say=lambda message: None):
     cases = [_case(name, own, step) for name, own in networks.items() for step in effort.steps]
     times = time_interleaved(cases, effort.repetitions, effort.seconds, say, clock=time.process_time)
     rows = speed_rows(effort.steps, times)
-    before = network.events()
-    steps = max(1, round(1e5 / longest))
-    network.context.getIntegrator().setStepSize(longest * MICROSECOND)
-    network.advance(steps)
-    monomers, filaments = (network.events() - before) / (steps * longest / 1e6)
     rows += event_rows(monomers, filaments, times[_name("turnover", longest)], longest)
     rows.append(Row("recommended_step_turnover", float(recommended), None, "us"))
     rows += [Row(f"segments_{name}", float(own.segments()), None, "segments") for name, own in networks.items()]
