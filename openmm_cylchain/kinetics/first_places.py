@@ -26,7 +26,12 @@ Places = tuple[IntArray, FloatArray]
 
 
 def contour_of(filament: Filament) -> FloatArray:
-    """Where the segments of a filament begin along it, with segments at rest, and its length: (segments + 1,) in nm."""
+    """Where the segments of a filament begin along it, with segments at rest, and its length: (segments + 1,) in nm.
+
+    Of one that is not there yet, (1,).
+    """
+    if filament.is_reserve:
+        return np.zeros(1)
     return np.concatenate([[0.0], np.cumsum(filament.type.segment_lengths(filament.segments, filament.closed))])
 
 
@@ -48,6 +53,7 @@ class FirstPlaces:
         if count == 0:
             return np.zeros(0, dtype=int), np.zeros(0)
         lengths = np.where(self._binds(hand), self._lengths, 0.0)
+        _refuse_without_length(lengths, count, name)
         if hand.site_spacing is None:
             chains = generator.choice(len(lengths), count, p=lengths / lengths.sum())
             return chains, generator.uniform(0.0, lengths[chains])
@@ -74,6 +80,7 @@ class FirstPlaces:
         """
         hand = kind.hands[1]
         found: list[tuple[int, int, float]] = []
+        _refuse_without_length(self._lengths[self._binds(hand)], count, kind.name)
         starts, vectors, chains, begins, lengths, bows = self._segments(hand)
         squares = np.sum(vectors**2, axis=1)
         halves = 0.5 * vectors
@@ -136,7 +143,7 @@ class FirstPlaces:
         # lengths along these, and how far a curve is from them.
         columns: list[list[FloatArray]] = [[], [], [], [], [], []]
         for number, (filament, contour) in enumerate(zip(self._filaments, self._contours)):
-            if not hand.binds(filament.type):
+            if not hand.binds(filament.type) or filament.is_reserve:
                 continue
             nodes, bows = self._nodes(number), np.zeros(filament.segments)
             if filament.control_points is not None:
@@ -179,6 +186,14 @@ class FirstPlaces:
         own = np.column_stack([chains, numbers])
         self._taken[spacing] = np.concatenate([self._taken_sites(spacing), own])
         return chains, (numbers + 0.5) * spacing
+
+
+def _refuse_without_length(lengths, count, name):
+    if not np.any(lengths > 0.0):
+        raise InputError(
+            f"Linkers {name!r}: {count} are to begin bound, but of the filaments that their hands bind to none is "
+            "there yet: let them begin unbound."
+        )
 
 
 def _open_curve(filament):
