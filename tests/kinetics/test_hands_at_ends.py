@@ -125,3 +125,30 @@ def test_a_system_keeps_what_hands_do_at_ends():
 def test_wrong_ends_are_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_the_first_node_of_a_capped_end_has_a_tether():
+    filaments = Filaments(viscosity=1e-3 * unit.pascal * unit.second, temperature=298.0)
+    monomers = Monomers(length=2.7, plus_on_rate=50 * PER_CONCENTRATION, plus_off_rate=PER_SECOND)
+    growth = Growth(monomers=monomers, pool=1e-6 * unit.molar, longest=1200.0, minus_capped=True)
+    for number in range(FILAMENTS):
+        filaments.add_equilibrium(ACTIN, segments=4, seed=number + 1, start=[0, 0, 0], growth=growth)
+        filaments.add_tether(number, 0, [0, 0, 0], 0.5)
+    with pytest.raises(InputError, match="minus_capped=True"):
+        filaments.add_tether(0, 1, [0, 0, 0], 0.5)
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 0.2 * unit.millisecond, random_seed=3, checks=False)
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
+    context.setPositions(positions)
+    first, squares = [nodes[0] for nodes in filaments.node_indices], []
+    integrator.step(100)
+    for _ in range(100):
+        integrator.step(20)
+        state = context.getState(getPositions=True)
+        squares.append(np.sum(state.getPositions(asNumpy=True)._value[first] ** 2, axis=1))
+    # 3 k_BT/k, and the filaments have grown.
+    expected = 3 * 0.00831446 * 298.0 / 0.5
+    means = np.mean(squares, axis=0)
+    assert abs(means.mean() - expected) < 4 * means.std() / np.sqrt(FILAMENTS)
+    assert means.std() / np.sqrt(FILAMENTS) < 0.02 * expected
+    assert np.all(filaments.in_context(context).growth().gained[:, 1] > 10)
