@@ -6,6 +6,8 @@
  */
 
 #include "TestChains.h"
+#include "couplings/ContactBodies.h"
+#include "couplings/ContactSearch.h"
 #include "growth/ChainGrowth.h"
 #include <map>
 #include <tuple>
@@ -197,6 +199,21 @@ struct Mean {
 inline void checkMean(double expected, const Mean& found, double power, const string& what) {
     check(found.error() < power*fabs(expected)/4, what+": too few samples");
     checkClose(expected, found.mean(), 4*found.error(), 1, what);
+}
+
+/** The energy of all contacts between bodies, with their particles at x. */
+inline double energyOfContacts(const ContactBodies& bodies, const Array& x, double stiffness) {
+    ContactSearch search(bodies.getCapsules());
+    vector<ContactPair> pairs;
+    search.findPairs(x.data(), x.data(), NULL, 0, pairs);
+    double energy = 0;
+    for (const ContactPair& pair : pairs) {
+        Contact contacts[2];
+        const int count = search.evaluate(pair, x.data(), x.data(), contacts, 0);
+        for (int i = 0; i < count; i++)
+            energy += 0.5*stiffness*contacts[i].weight*contacts[i].gap*contacts[i].gap;
+    }
+    return energy;
 }
 
 #endif /*GROWING_CHAINS_H_*/

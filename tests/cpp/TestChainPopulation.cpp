@@ -194,21 +194,8 @@ static void testContactsOfWhole() {
                 chain.nodes.swap(chain.spareNodes);
             chains.add(chain);
         }
-        auto energyOf = [&] (int number) {
-            ContactBodies first = bodies;
-            first.chains.resize(number);
-            ContactSearch search(first.getCapsules());
-            vector<ContactPair> pairs;
-            search.findPairs(x.data(), x.data(), NULL, 0, pairs);
-            double energy = 0;
-            for (const ContactPair& pair : pairs) {
-                Contact found[2];
-                const int count = search.evaluate(pair, x.data(), x.data(), found, 0);
-                for (int i = 0; i < count; i++)
-                    energy += 0.5*7*found[i].weight*found[i].gap*found[i].gap;
-            }
-            return energy;
-        };
+        ContactBodies others = bodies;
+        others.chains.pop_back();
         vector<Vec3d> nodes;
         for (int node = 15; node < 18; node++)
             nodes.push_back({x[3*node], x[3*node+1], x[3*node+2]});
@@ -217,7 +204,7 @@ static void testContactsOfWhole() {
         const vector<Vec3d> start = {nodes[0]};
         const EndChange begins = {5, 1, start, nodes, 0, 2, {}, {}, 1};
         const EndChange vanishes = {5, 1, nodes, start, 2, 0, {}, {}, 1};
-        const double expected = energyOf(6)-energyOf(5);
+        const double expected = energyOfContacts(bodies, x, 7)-energyOfContacts(others, x, 7);
         touching += expected > 0;
         checkClose(expected, contacts.findChange(begins), 1+expected, 1e-9, "the contacts of what begins");
         contacts.show(5, nodes, {});

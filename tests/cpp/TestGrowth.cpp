@@ -306,20 +306,6 @@ static void testOrder() {
     check(grown(1) == grown(5), "a chain by itself and among others");
 }
 
-static double energyOfContacts(const ContactBodies& bodies, const Array& x, double stiffness) {
-    ContactSearch search(bodies.getCapsules());
-    vector<ContactPair> pairs;
-    search.findPairs(x.data(), x.data(), NULL, 0, pairs);
-    double energy = 0;
-    for (const ContactPair& pair : pairs) {
-        Contact contacts[2];
-        const int count = search.evaluate(pair, x.data(), x.data(), contacts, 0);
-        for (int i = 0; i < count; i++)
-            energy += 0.5*stiffness*contacts[i].weight*contacts[i].gap*contacts[i].gap;
-    }
-    return energy;
-}
-
 /** The change at an end is that of the energy of all contacts. */
 static void testContacts() {
     mt19937_64 generator = generatorOf(8);
