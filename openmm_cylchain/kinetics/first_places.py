@@ -26,7 +26,12 @@ Places = tuple[IntArray, FloatArray]
 
 
 def contour_of(filament: Filament) -> FloatArray:
-    """Where the segments of a filament begin along it, with segments at rest, and its length: (segments + 1,) in nm."""
+    """Where the segments of a filament begin along it, with segments at rest, and its length: (segments + 1,) in nm.
+
+    A zero alone of a filament that has not begun.
+    """
+    if filament.is_reserve:
+        return np.zeros(1)
     return np.concatenate([[0.0], np.cumsum(filament.type.segment_lengths(filament.segments, filament.closed))])
 
 
@@ -48,6 +53,7 @@ class FirstPlaces:
         if count == 0:
             return np.zeros(0, dtype=int), np.zeros(0)
         lengths = np.where(self._binds(hand), self._lengths, 0.0)
+        self._refuse_without_filaments(hand, count, name)
         if hand.site_spacing is None:
             chains = generator.choice(len(lengths), count, p=lengths / lengths.sum())
             return chains, generator.uniform(0.0, lengths[chains])
@@ -74,6 +80,9 @@ class FirstPlaces:
         """
         hand = kind.hands[1]
         found: list[tuple[int, int, float]] = []
+        if count == 0:
+            return np.zeros(0, dtype=int), (np.zeros(0, dtype=int), np.zeros(0))
+        self._refuse_without_filaments(hand, count, kind.name)
         starts, vectors, chains, begins, lengths, bows = self._segments(hand)
         squares = np.sum(vectors**2, axis=1)
         halves = 0.5 * vectors
@@ -136,7 +145,7 @@ class FirstPlaces:
         # lengths along these, and how far a curve is from them.
         columns: list[list[FloatArray]] = [[], [], [], [], [], []]
         for number, (filament, contour) in enumerate(zip(self._filaments, self._contours)):
-            if not hand.binds(filament.type):
+            if not hand.binds(filament.type) or filament.is_reserve:
                 continue
             nodes, bows = self._nodes(number), np.zeros(filament.segments)
             if filament.control_points is not None:
@@ -167,7 +176,11 @@ class FirstPlaces:
         return vectors if self._box is None else to_nearest_images(vectors, self._box)
 
     def _binds(self, hand):
-        return np.array([hand.binds(filament.type) for filament in self._filaments])
+        return np.array([hand.binds(filament.type) and not filament.is_reserve for filament in self._filaments])
+
+    def _refuse_without_filaments(self, hand, count, name):
+        if not np.any(self._binds(hand)):
+            raise InputError(f"Linkers {name!r}: {count} are to begin bound, but there is no filament to bind to yet.")
 
     def _sites(self, spacing, lengths):
         return np.floor(np.minimum(lengths / spacing, _MOST_SITES) + 1e-9).astype(int)

@@ -272,9 +272,6 @@ def contours_in(context: openmm.Context, filaments: Sequence[Filament]) -> list[
     for number, monomers in zip(present.filaments, present.monomers):
         filament = filaments[number]
         length = filament.growth.monomers.length
-        if monomers[0] == monomers[1]:
-            contours[number] = np.zeros(1)
-            continue
         rest = rest_lengths(monomers, filament.growth.monomers_per_segment(filament.type), length)
         contours[number] = monomers[0] * length + np.concatenate([[0.0], np.cumsum(rest)])
     return contours

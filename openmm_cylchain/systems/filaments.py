@@ -196,7 +196,10 @@ class Filaments(TiedFilaments):
 
     def _coinciding(self):
         for number, nodes in enumerate(self._nodes):
-            if self._filaments[number].spare_nodes:
+            own = self._filaments[number]
+            if own.may_be_absent:
+                yield tuple(nodes.tolist())
+            elif own.spare_nodes:
                 # Any node but the first may become a spare one.
                 yield tuple(nodes[1:].tolist())
             mine = self._attachments_of[number]
