@@ -114,9 +114,6 @@ def _set_ends(force, index, growth):
 
 def _add_nucleator(force, filament, indices, box):
     nucleation, growth = filament.nucleation, filament.growth
-    monomers = growth.fewest_monomers(filament.type)
-    if nucleation.length is not None:
-        monomers = round(nucleation.length / growth.monomers.length)
     direction = np.zeros(3) if nucleation.direction is None else nucleation.direction
     rate = nucleation.whole_rate(box)
     if isinstance(nucleation, Branching):
@@ -124,7 +121,7 @@ def _add_nucleator(force, filament, indices, box):
     force.addNucleator(
         rate,
         nucleation.order,
-        monomers,
+        nucleation.monomers(growth, filament.type),
         *nucleation.described_region,
         openmm.Vec3(*direction),
         indices,

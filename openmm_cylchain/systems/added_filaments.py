@@ -285,6 +285,11 @@ class AddedFilaments:
             )
         require_nucleation(nucleation)
         filament = shapes.reserve_filament(filament_type, label, growth, nucleation, planar, propulsion)
+        if nucleation is not None:
+            try:
+                nucleation.monomers(growth, filament_type)
+            except InputError as error:
+                raise InputError(f"{label}: {error}") from None
         numbers = range(len(self), len(self) + whole_number(count, 1, f"{label}: count"))
         # Apart from each other, since forces between all particles of a System divide by distances.
         self._filaments += [replace(filament, positions=filament.positions + _reserve_place(own)) for own in numbers]
