@@ -6,7 +6,6 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import (
-    ACTIN_AGING,
     F_ACTIN,
     EndStates,
     Filaments,
@@ -77,7 +76,7 @@ def simulated_aging(gain, losses, aging, count, monomers, steps, most, parts=200
 )
 def test_ends_of_monomers_that_age(count, steps):
     """Both ends gain and lose as a simulation of a few lines does; monomers of the start are old."""
-    gain, losses, aging = 3.0, np.array([[0.3, 0.05, 0.5], [0.6, 0.1, 4.0]]), np.array([0.6, 0.3])
+    gain, losses, aging = 2.0, np.array([[0.1, 0.05, 0.5], [0.1, 0.3, 6.0]]), np.array([2.0, 1.0])
     states = [
         MonomerState(
             name=f"state {number}",
@@ -107,18 +106,8 @@ def test_ends_of_monomers_that_age(count, steps):
     # An end whose monomers were all new, or all old, would be far from that.
     error = moved[:, 1].std() / np.sqrt(count)
     for state in (0, 2):
-        assert abs(steps * (gain - losses[1, state]) - moved[:, 1].mean()) > 12.0 * error
+        assert abs(steps * (gain - losses[1, state]) - moved[:, 1].mean()) > 8.0 * error
     assert np.all(found.end_states[:, 0] == 2) and set(found.end_states[:, 1]) == {0, 1, 2}
-
-
-def test_minus_ends_shrink_as_old_monomers_do():
-    """Filaments that are added are ADP-actin: exactly k_off of that state."""
-    growth = Growth(monomers=ACTIN_AGING, pool=MonomerPool(0.0), longest=500.0, plus_capped=True)
-    filaments, context = contexts_of(growth, 500, 4, 1e12)
-    context.getIntegrator().step(20)
-    found = filaments.in_context(context).growth()
-    mean_within(found.lost[:, 0], 0.25 * 20.0, 0.15)
-    assert not found.gained.any() and not found.lost[:, 1].any()
 
 
 @pytest.mark.parametrize(("count", "steps"), [(100, 300), pytest.param(400, 1000, marks=pytest.mark.slow)])
