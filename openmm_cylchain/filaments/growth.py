@@ -28,6 +28,7 @@ from ..units.types import FloatArray, Indices, Scalar
 from .chain_type import ChainType
 from .end_states import GROWING, SHRINKING, DynamicInstability, EndStates, TwoUnitCap, as_on_rate, as_tuple
 from .filament_type import FilamentType
+from .severing import Severing
 
 _SAME_LENGTH = 1e-6
 """By what share the length of a segment may differ from that of its monomers."""
@@ -213,45 +214,6 @@ class MonomerPool:
                     f"A pool of {self.concentration * self.volume:.3g} monomers has more than the "
                     f"{_MOST_MONOMERS_OF_POOL:.0e} that are counted one by one: leave its volume out."
                 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Severing:
-    """How a filament is cut at random, between any two of its monomers.
-
-    Both parts are filaments then, and lengths and bends keep their equilibrium. The part at the plus end becomes one of
-    those that ``Filaments.add_reserve`` has added. A part that is shorter than ``Growth.shortest`` vanishes if its
-    filament ``vanishes``, and filaments are not cut there if not.
-
-    Parameters
-    ----------
-    rate : 1/(length*time)
-        How often in a length.
-    of_states : sequence of str, optional
-        Of monomers with states (``Monomers.aging``): the names of those before which it is cut; any if not given.
-    shrinks : bool
-        New plus ends shrink, where these have a dynamic instability.
-
-    The attributes hold plain numbers, in 1/(nm ps).
-
-    Raises
-    ------
-    InputError
-        For a rate that is negative or not finite.
-    """
-
-    rate: float
-    of_states: tuple[str, ...] = ()
-    shrinks: bool = False
-
-    if TYPE_CHECKING:
-
-        def __init__(self, *, rate: Scalar, of_states: Sequence[str] = (), shrinks: bool = False) -> None: ...
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rate", non_negative(self.rate, RATE / LENGTH, "rate of severing"))
-        object.__setattr__(self, "of_states", as_tuple(self.of_states, "Severing: of_states"))
-        true_or_false(self.shrinks, "Severing: shrinks")
 
 
 @dataclass(frozen=True, kw_only=True)

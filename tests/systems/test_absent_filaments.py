@@ -347,7 +347,7 @@ def test_what_a_context_says_of_filaments_that_are_not_there():
     with pytest.raises(InputError, match="grows"):
         inside.joint_tensions()
     openmm.LocalEnergyMinimizer.minimize(simulation.context, 1e-3)
-    for nodes in filaments.node_indices[3:]:
+    for nodes in (filaments.node_indices[number] for number in (0, 3, 4)):
         assert np.all(positions_of(simulation.context)[nodes] == positions_of(simulation.context)[nodes][0])
     assert np.all(forces_of(simulation.context)[np.concatenate(filaments.node_indices[3:])] == 0.0)
 
@@ -377,3 +377,47 @@ def test_copies_and_xml_of_systems():
     for own in found[1:]:
         np.testing.assert_array_equal(own, found[0])
     assert np.ptp(found[0][filaments.node_indices[1]]) > 0.0
+
+
+@pytest.mark.parametrize("kind", ["checkpoint", "State", "set_growth"])
+def test_contexts_go_back_to_before_filaments_began(kind):
+    """Also those that do not vanish by themselves."""
+    lasting = Growth(monomers=ACTIN_ATP, pool=POOL, longest=300.0)
+    filaments = added(0, 0, 3, growth=lasting, nucleation=Nucleation(rate=1e6 / unit.second, region=REGION))
+    context = simulated(filaments, *filaments.build()).context
+    inside = filaments.in_context(context)
+    checkpoint = context.createCheckpoint()
+    state = context.getState(positions=True, parameters=True, integratorParameters=True)
+    context.getIntegrator().step(20)
+    assert np.all(inside.growth().nodes > 0)
+    if kind == "checkpoint":
+        context.loadCheckpoint(checkpoint)
+    elif kind == "State":
+        context.setState(state)
+    else:
+        inside.set_growth(np.zeros((3, 2), dtype=int))
+    assert not inside.growth().nodes.any() and energy_of(context) == 0.0
+    positions = positions_of(context)
+    for nodes in filaments.node_indices:
+        assert np.all(positions[nodes] == positions[nodes][0])
+    context.getIntegrator().step(20)
+    assert np.all(inside.growth().nodes > 0)
+
+
+def test_periodic_boxes():
+    """Where filaments begin anywhere in the box, with contacts of nearest images."""
+    filaments = added(1, 0, 4, nucleation=Nucleation(rate=3e5 / unit.second))
+    topology, system, positions = filaments.build(box_vectors=400.0 * np.eye(3))
+    system.addForce(capsule_contact_force(filaments, system, 8.0))
+    simulation = simulated(filaments, topology, system, positions)
+    counts = []
+    for _ in range(4):
+        simulation.step(10)
+        state = simulation.context.getState(positions=True, enforcePeriodicBox=True)
+        wrapped = state.getPositions(asNumpy=True)._value
+        whole = make_whole(wrapped, filaments, 400.0 * np.eye(3))._value
+        nodes = filaments.in_context(simulation.context).growth().nodes
+        counts.append((nodes > 0).sum())
+        for count, own in zip(nodes, filaments.node_indices):
+            assert analysis.count_nodes(whole[own]) == count
+    assert counts[-1] >= 4
