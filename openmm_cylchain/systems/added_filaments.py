@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..filaments import shapes
 from ..filaments.chain_type import ChainType
 from ..filaments.filament import Filament
+from ..filaments.filament_type import FilamentType
 from ..filaments.growth import Growth
 from ..filaments.shapes import FilamentOptions
 from ..kinetics.nucleation import Nucleation, require_nucleation
@@ -285,7 +286,7 @@ class AddedFilaments:
             )
         require_nucleation(nucleation)
         filament = shapes.reserve_filament(filament_type, label, growth, nucleation, planar, propulsion)
-        if nucleation is not None:
+        if nucleation is not None and isinstance(filament_type, FilamentType):
             try:
                 nucleation.monomers(growth, filament_type)
             except InputError as error:

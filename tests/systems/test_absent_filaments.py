@@ -353,7 +353,8 @@ def test_what_a_context_says_of_filaments_that_are_not_there():
 
 
 def test_filaments_that_are_not_there_have_no_energy():
-    filaments = added()
+    """Also where their particles are behind a wall."""
+    filaments = added(nucleation=Nucleation(rate=0.0, region=Sphere([0, 0, 5000], 10.0)))
     simulation = simulated(filaments, *with_surroundings(filaments))
     assert energy_of(simulation.context) == 0.0 and not forces_of(simulation.context).any()
     simulation.step(10)
