@@ -118,7 +118,7 @@ def test_angles_of_branches(microseconds, between):
     assert angles.std() == pytest.approx(spread, rel=0.05)
     error = squares.mean(axis=0).std(ddof=1) / np.sqrt(squares.shape[1])
     expected = np.average(apart**2, weights=weights)
-    assert error < 0.03 * expected and abs(squares.mean() - expected) < 4.0 * error + 0.02 * expected
+    assert error < 0.03 * expected and abs(squares.mean() - expected) < 4.0 * error
     assert np.mean(energies) == pytest.approx(0.5, abs=4.0 * np.std(energies) / np.sqrt(120))
 
 

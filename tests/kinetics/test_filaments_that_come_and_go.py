@@ -8,7 +8,7 @@ import tracemalloc
 import numpy as np
 import openmm
 import pytest
-from openmm import unit
+from openmm import app, unit
 
 from openmm_cylchain import (
     F_ACTIN,
@@ -167,6 +167,58 @@ def test_rods_between_walls(microseconds, steps):
     # There would be more without walls.
     assert weights.sum() < 0.9 * np.sum(0.7 ** (rods - FEWEST))
     mean_within(lengths, 0.5, 0.08)
+
+
+BALL, ROOM = 100.0, 140.0
+"""The radii of an obstacle, with the filament, and of the sphere around it, in nm."""
+
+
+def weights_around_a_ball(monomers, count=200_000):
+    """exp(-V/k_BT) of rods between a ball and a sphere, by Monte Carlo of their first nodes within ROOM + 5 nm."""
+    generator = np.random.default_rng(6)
+    first, along = generator.normal(size=(2, count, 3))
+    first *= (ROOM + 5.0) * (generator.uniform(size=count) ** (1.0 / 3.0) / np.linalg.norm(first, axis=1))[:, None]
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    weights = []
+    for number in monomers:
+        length = number * MONOMER
+        nearest = np.clip(-np.sum(first * along, axis=1), 0.0, length)
+        depths = [BALL - np.linalg.norm(first + nearest[:, None] * along, axis=1)]
+        depths += [np.linalg.norm(own, axis=1) - ROOM for own in (first, first + length * along)]
+        weights.append(np.exp(-0.5 * WALL * sum(np.maximum(own, 0.0) ** 2 for own in depths) / KT).mean())
+    return np.array(weights)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::openmm_cylchain.ContactWarning")
+def test_rods_around_a_ball():
+    """New ones, and monomers that come, find contacts and walls in their way."""
+    step, ratio, turnover, free, steps, thin = 1.0 * MICROSECOND, 0.6, 4.0, 120.0, 5000, 0.5
+    loss = turnover / step
+    topology, system = app.Topology(), openmm.System()
+    topology.addAtom("B", None, topology.addResidue("B", topology.addChain()))
+    system.addParticle(0.0)
+    filaments = Filaments(WATER, TEMPERATURE)
+    region = Sphere([0, 0, 0], ROOM + 5.0)
+    nucleation = Nucleation(rate=free * (1.0 - ratio) * loss, region=region)
+    filaments.add_reserve(ACTIN, 200, growth=growth(ratio * loss, loss), nucleation=nucleation)
+    positions = filaments.add_to(topology, system, np.zeros((1, 3)))
+    # Rods are so thin that they hardly meet each other.
+    contacts = capsule_contact_force(filaments, system, thin, WALL, [0], 2.0 * BALL - thin)
+    system.addForce(contacts)
+    system.addForce(filament_wall_force(filaments, system, Sphere([0, 0, 0], ROOM), WALL))
+    context = simulate(filaments, system, positions, step)
+    context.getIntegrator().step(100)
+    _, monomers, lengths, _ = blocks(filaments, system, context, steps)
+    rods = np.arange(FEWEST, PER_SEGMENT + 4)
+    weights = ratio ** (rods - FEWEST) * weights_around_a_ball(rods)
+    straight = [own[own <= rods[-1]] for own in monomers]
+    mean_within([len(own) / 10.0 for own in straight], free * (1.0 - ratio) * weights.sum(), 0.08)
+    mean_within([own.mean() for own in straight], np.average(rods, weights=weights), 0.03)
+    # Of free ones there would be three times as many, and longer.
+    assert weights.sum() < 0.4 * np.sum(ratio ** (rods - FEWEST))
+    assert np.average(rods, weights=weights) < 0.95 * np.average(rods, weights=ratio**rods)
+    mean_within(lengths, 0.5, 0.1)
 
 
 STILL = EndStates(on_rates=[0.0, 0.0], off_rates=[0.0, 0.0], switch_rates=np.zeros((2, 2)))
