@@ -41,9 +41,10 @@ from .filaments.attachments import Attachment
 from .filaments.end_states import DynamicInstability, EndStates, TwoUnitCap
 from .filaments.filament import Filament, Tether
 from .filaments.filament_type import FilamentType
-from .filaments.growth import Growth, MonomerPool, Monomers, MonomerState, Severing
+from .filaments.growth import Growth, MonomerPool, Monomers, MonomerState
 from .filaments.presets import ACTIN_AGING, ACTIN_ATP, DSDNA, F_ACTIN, MICROTUBULE, TUBULIN
 from .filaments.segment_place import SegmentPlace
+from .filaments.severing import Severing
 from .filaments.shapes import FilamentOptions
 from .kinetics.branching import Branching
 from .kinetics.crosslinker import Crosslinker

@@ -6,6 +6,7 @@ Of a filament of beam elements, whose control points have the name "CTL", functi
 elements, tangents at its nodes, and points along all of it.
 Of a filament that grows, nodes come and go: its other particles are where the last node is (``count_nodes``). What is
 given for each node, segment or joint is NaN where there is none in a frame, and averages are over those that there are.
+All is NaN in frames in which there is no filament: before it has begun, or where it has vanished.
 Anything else in the trajectory is left alone. Positions have to be those of whole filaments, not wrapped
 into a periodic box (``periodic`` makes them whole). Results are plain numbers in OpenMM's units (nm, ps).
 
@@ -17,7 +18,9 @@ InputError for a trajectory without filaments and for indices out of range.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import mdtraj
 import numpy as np
@@ -131,9 +134,23 @@ def _segment_vectors(trajectory, filaments):
 def end_to_end_vectors(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
     """Vectors from the first to the last node: (frames, filaments, 3) array in nm. Raises InputError for rings."""
     refuse_rings(trajectory, filaments, "end-to-end vector")
-    # Spare nodes are where the last node is.
+    # Spare nodes are where the last node is; all of them, if there is no filament.
     ends = [particles[:, [0, -1]].astype(float) for particles in _particles(trajectory, filaments)]
-    return np.stack([p[:, -1] - p[:, 0] for p in ends], axis=1)
+    there = _are_there(node_positions(trajectory, filaments))
+    return np.where(there[..., None], np.stack([p[:, -1] - p[:, 0] for p in ends], axis=1), np.nan)
+
+
+def _are_there(nodes):
+    # Which filaments there are (frames, filaments), with the positions of their nodes.
+    return np.stack([np.isfinite(own[:, 0, 0]) for own in nodes], axis=1)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    # Of a filament that is not there, NumPy would say that it has no mean.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        yield
 
 
 def radii_of_gyration(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
@@ -142,7 +159,8 @@ def radii_of_gyration(trajectory: mdtraj.Trajectory, filaments: int | Indices | 
     Of beam elements, those of the curve.
     """
     positions = _curves(node_positions(trajectory, filaments), trajectory, filaments)
-    return np.stack([np.sqrt(np.nanvar(p, axis=1).sum(axis=-1)) for p in positions], axis=1)
+    with _quiet():
+        return np.stack([np.sqrt(np.nanvar(p, axis=1).sum(axis=-1)) for p in positions], axis=1)
 
 
 def centers_of_mass(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
@@ -156,7 +174,8 @@ def centers_of_mass(trajectory: mdtraj.Trajectory, filaments: int | Indices | No
 def center_of_segments(positions: FloatArray, ring: bool) -> FloatArray:
     """Mean (frames, 3) of the midpoints of segments between positions (frames, points, 3)."""
     # Every node of a ring belongs to two segments.
-    return positions.mean(axis=1) if ring else 0.5 * np.nanmean(positions[:, 1:] + positions[:, :-1], axis=1)
+    with _quiet():
+        return positions.mean(axis=1) if ring else 0.5 * np.nanmean(positions[:, 1:] + positions[:, :-1], axis=1)
 
 
 def segment_lengths(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
@@ -174,7 +193,8 @@ def _nodes_and_control_points(trajectory, filaments):
 
 def contour_lengths(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
     """Sums of the segments' lengths: (frames, filaments) array in nm."""
-    return np.stack([np.nansum(lengths, axis=1) for lengths in segment_lengths(trajectory, filaments)], axis=1)
+    lengths = np.stack([np.nansum(own, axis=1) for own in segment_lengths(trajectory, filaments)], axis=1)
+    return np.where(_are_there(node_positions(trajectory, filaments)), lengths, np.nan)
 
 
 def tangents(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:

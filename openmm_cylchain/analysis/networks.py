@@ -29,7 +29,7 @@ def filament_distances(run: Run, frame: int, cutoff: Scalar) -> FloatArray:
     Returns
     -------
     (filaments, filaments) array
-        In nm, symmetric; infinite beyond the cutoff, 0 on the diagonal.
+        In nm, symmetric; infinite beyond the cutoff and to filaments that are not there, 0 on the diagonal.
 
     Raises
     ------
@@ -54,11 +54,10 @@ class _NearSegments:
         lines = run.curves(frame)
         starts = np.concatenate([own if filament.ring else own[:-1] for filament, own in zip(run.filaments, lines)])
         self.vectors = np.concatenate([segment_vectors(own, each.ring) for each, own in zip(run.filaments, lines)])
-        self.owners = np.repeat(
-            np.arange(len(run.filaments)), [len(own) - (not each.ring) for each, own in zip(run.filaments, lines)]
-        )
+        counts = [max(0, len(own) - (not each.ring)) for each, own in zip(run.filaments, lines)]
+        self.owners = np.repeat(np.arange(len(counts)), counts)
         # Two segments within the cutoff have middles within that and half of their lengths.
-        reach = cutoff + float(np.linalg.norm(self.vectors, axis=1).max())
+        reach = cutoff + float(np.linalg.norm(self.vectors, axis=1).max(initial=0.0))
         pairs = pairs_of_points(starts + 0.5 * self.vectors, reach, run.box)
         pairs = pairs.where(self.owners[pairs.first] != self.owners[pairs.second])
         between = starts[pairs.second] + pairs.shift - starts[pairs.first]
@@ -166,7 +165,7 @@ def mesh_size(run: Run, volume: Scalar | None = None) -> float:
 
 
 def contraction(run: Run) -> FloatArray:
-    """The radius of gyration of all nodes over that of the first frame: (frames,) array.
+    """The radius of gyration of all nodes over that of the first frame with any: (frames,) array, NaN without any.
 
     For networks without a periodic box, where filaments may leave a volume; all nodes have one weight.
 
@@ -178,5 +177,7 @@ def contraction(run: Run) -> FloatArray:
     require_run(run)
     if run.box is not None:
         raise InputError("A periodic box does not contract: look at contacts or distances instead.")
-    radii = [math.sqrt(float(np.var(np.concatenate(run.curves(frame)), axis=0).sum())) for frame in range(len(run))]
-    return np.array(radii) / radii[0]
+    points = (np.concatenate(run.curves(frame)) for frame in range(len(run)))
+    radii = np.array([math.sqrt(float(np.var(own, axis=0).sum())) if len(own) else np.nan for own in points])
+    there = np.flatnonzero(np.isfinite(radii))
+    return radii / radii[there[0]] if len(there) else radii

@@ -205,6 +205,15 @@ class Run:
         ]
         return [DescribedContactFinder(contacts, filaments, own.particles, self.box) for contacts in there]
 
+    def points(self, frame: int) -> FloatArray:
+        """Positions (points, 3) in nm of what there is in a frame: points along filaments, and other particles.
+
+        Of a frame without any of these, positions of the particles of filaments that are not there.
+        """
+        positions = self.positions(frame)
+        there = np.concatenate([*self.curves(frame), *(positions[own.indices] for own in self.particles)])
+        return there if len(there) else positions
+
     def contacts(self, frame: int) -> ContactFrame:
         """Contacts of a frame, of all ``capsule_contact_force`` or ``[contacts]``: none if there is no such.
 
@@ -347,9 +356,16 @@ class Run:
         return {int(node): own.type.name for own in self.filaments for node in own.nodes}
 
     def nodes(self, frame: int) -> list[FloatArray]:
-        """Positions (nodes, 3) in nm of the nodes that each filament has in a frame."""
+        """Positions (nodes, 3) in nm of the nodes that each filament has in a frame: none where it is not there."""
         positions = self.positions(frame)
         return [positions[nodes] for nodes in self._nodes_in(frame)]
+
+    @property
+    def passing(self) -> frozenset[int]:
+        """The numbers of filaments that are not there in some frame: that begin, vanish, or are parts of others."""
+        counts = self.growth.get("nodes", np.ones((0, 0)))
+        gone = np.flatnonzero((counts == 0).any(axis=0))
+        return frozenset(int(number) for number in self.growth["filament"][0][gone]) if len(gone) else frozenset()
 
     def monomers(self, frame: int) -> dict[int, IntArray]:
         """The number of the first monomer of filaments that grow, and that behind the last one, in a frame.

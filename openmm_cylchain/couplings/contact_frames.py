@@ -123,16 +123,19 @@ class DescribedContactFinder:
         choose_engine("compiled")
         from .. import plugin
 
-        # Behind the last chain stands what spheres have.
-        owners = [*(filaments.get(nodes, (-1, 1)) for nodes, *_ in contacts.chains), (-1, 1)]
+        # Filaments that are not there now have no nodes. Behind the last chain stands what spheres have.
+        there = {number: chain for number, chain in enumerate(contacts.chains) if chain[0]}
+        owners = [*(filaments.get(nodes, (-1, 1)) for nodes, *_ in there.values()), (-1, 1)]
         self._filaments, self._pieces = np.array(owners).T
         self._force: Any = plugin.CylinderChainContactForce(contacts.stiffness)
-        for nodes, diameter, neighbors, ring in contacts.chains:
+        for nodes, diameter, neighbors, ring in there.values():
             self._force.addChain(list(nodes), diameter, neighbors, ring)
         for particle, diameter in contacts.spheres:
             self._force.addSphere(particle, diameter)
-        for exclusion in contacts.exclusions:
-            self._force.addExclusion(*exclusion)
+        index = {-1: -1, **{number: own for own, number in enumerate(there)}}
+        for chain, segment, other, other_segment in contacts.exclusions:
+            if chain in index and other in index:
+                self._force.addExclusion(index[chain], segment, index[other], other_segment)
         self._force.setUsesPeriodicBoundaryConditions(contacts.periodic)
         system = openmm.System()
         for _ in range(particles):

@@ -31,8 +31,8 @@ def visible_diameter(run: Run, own: RunParticles) -> float:
 
 
 def walls(run: Run) -> list[FloatArray]:
-    """Lines (n, 3) in nm on the walls of a run, as far as filaments are beside them at its ends."""
-    return wall_lines(run, np.concatenate([points for frame in (0, -1) for points in run.curves(frame)]))
+    """Lines (n, 3) in nm on the walls of a run, as far as something is beside them at its ends."""
+    return wall_lines(run, np.concatenate([run.points(frame) for frame in (0, -1)]))
 
 
 def spring_labels(run: Run) -> list[str]:

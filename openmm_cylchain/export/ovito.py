@@ -115,7 +115,7 @@ def _along_filaments(run, names, counts):
     bonds, bond_types, first = [], [], 0
     for own, count in zip(run.filaments, counts):
         points = first + np.arange(count)
-        bonds.append(np.stack([points, np.roll(points, -1)], axis=1)[: count - (not own.ring)])
+        bonds.append(np.stack([points, np.roll(points, -1)], axis=1)[: max(0, count - (not own.ring))])
         bond_types.append(np.full(len(bonds[-1]), names.index(own.label)))
         first += count
     types = np.repeat([names.index(own.label) for own in run.filaments], counts)
@@ -128,7 +128,7 @@ def _cell(run):
     if run.box is not None:
         (a, _, _), (xy, b, _), (xz, yz, c) = run.box
         return 0.5 * run.box.sum(axis=0), np.array([a, b, c, xy / b, xz / c, yz / c]) * [1, 1, 1, 0.1, 0.1, 0.1]
-    frames = [run.positions(frame) for frame in range(len(run))]
-    lower, upper = np.min(frames, axis=(0, 1)), np.max(frames, axis=(0, 1))
+    points = np.concatenate([run.points(frame) for frame in range(len(run))])
+    lower, upper = points.min(axis=0), points.max(axis=0)
     edge = 3.0 * float(np.max(upper - lower)) + 1.0
     return 0.5 * (lower + upper), np.array([edge, edge, edge, 0.0, 0.0, 0.0])

@@ -97,7 +97,7 @@ def _types(run):
 def _box(run, outlines):
     if run.box is not None:
         return 0.5 * run.box.sum(axis=0), np.abs(run.box).sum(axis=0)
-    frames = [run.positions(frame) for frame in np.unique(np.linspace(0, len(run) - 1, 20).astype(int))]
+    frames = [run.points(frame) for frame in np.unique(np.linspace(0, len(run) - 1, 20).astype(int))]
     points = np.concatenate([*frames, *outlines])
     lower, upper = points.min(axis=0), points.max(axis=0)
     return 0.5 * (lower + upper), 1.1 * (upper - lower) + thickness(run)
@@ -106,6 +106,8 @@ def _box(run, outlines):
 def _agents(run, frame, types, center, outlines):
     data: list[float] = []
     for number, (own, points) in enumerate(zip(run.filaments, run.curves(frame))):
+        if not len(points):
+            continue
         points = unrolled(points) if own.ring else points
         data += _agent(_FIBER, number, types["filament", own.label], 0.5 * own.diameter, points - center)
     number = len(run.filaments)

@@ -56,8 +56,9 @@ def write_vmd(run: Run, path: str | Path) -> None:
     """Write a script that opens a run in VMD: ``vmd -e FILE``.
 
     It loads ``topology.psf`` and ``trajectory.dcd`` from the directory of the run, which must stay where it is. Bonds
-    are as thick as filaments, or as can be seen. Linkers that join two places, crosslinks, lines on walls
-    and curves of beam elements are drawn for each frame, and the time, which VMD does not read from DCD files.
+    are as thick as filaments, or as can be seen. Linkers that join two places, crosslinks, lines on walls,
+    curves of beam elements and filaments that come and go are drawn for each frame, and the time, which VMD does not
+    read from DCD files.
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ def write_vmd(run: Run, path: str | Path) -> None:
     """
     path = check_path(path, ".tcl")
     directory = run.path.resolve()
-    extent = float(np.linalg.norm(np.ptp(run.positions(-1), axis=0)))
+    extent = float(np.linalg.norm(np.ptp(run.points(-1), axis=0)))
     name, length = time_unit(float(run.times[-1]))
     lines = [
         f"set molecule [mol new {_word(directory / 'topology.psf')} type psf waitfor all]",
@@ -78,25 +79,26 @@ def write_vmd(run: Run, path: str | Path) -> None:
         "color Display Background white",
         "display projection Perspective",
     ]
-    # Licorice knows the radius of bonds. Those of beam elements are chords, and their curves are drawn in their place.
-    widest = max(own.diameter for own in run.filaments)
+    # Licorice knows the radius of bonds. Those of beam elements are chords, and those of filaments that are not there
+    # now are dots: curves are drawn in their place.
+    widest, passing = max(own.diameter for own in run.filaments), run.passing
     curves: dict[int, tuple[float, list[int]]] = {}
     for number, (kind, color) in enumerate(filament_colors(run).items()):
         diameter = max(own.diameter for own in run.filaments if own.label == kind)
         radius = _ANGSTROM * 0.5 * max(diameter, 0.006 * extent * diameter / widest)
         members = [i for i, own in enumerate(run.filaments) if own.label == kind]
-        beams = [i for i in members if run.filaments[i].pieces > 1]
+        drawn = [i for i in members if run.filaments[i].pieces > 1 or i in passing]
         lines.append(_color(_FIRST_COLOR + number, color))
-        if beams:
-            curves[_FIRST_COLOR + number] = radius, beams
-        if len(beams) == len(members):
+        if drawn:
+            curves[_FIRST_COLOR + number] = radius, drawn
+        if len(drawn) == len(members):
             continue
-        hidden = " ".join(str(node) for i in beams for own in _particles(run.filaments[i]) for node in own)
+        hidden = " ".join(str(node) for i in drawn for own in _particles(run.filaments[i]) for node in own)
         selection = (
             f"resname {_word(run.filaments[members[0]].type.name)}{f' and not index {hidden}' if hidden else ''}"
         )
         if run.filaments[members[0]].load:
-            straight = (run.filaments[i].nodes for i in members if i not in beams)
+            straight = (run.filaments[i].nodes for i in members if i not in drawn)
             selection = f"index {' '.join(str(node) for nodes in straight for node in nodes)}"
         lines += [
             f"mol representation Licorice {radius:.6g} 12 12",
@@ -132,7 +134,7 @@ def write_vmd(run: Run, path: str | Path) -> None:
     outlines = " ".join("{" + " ".join(map(_point, line)) + "}" for line in walls(run))
     times = " ".join(f"{time / length:.6g}" for time in run.times)
     colors = " ".join(str(first + kind) for kind in range(len(run.spring_names)))
-    corner = _ANGSTROM * run.positions(-1).max(axis=0)
+    corner = _ANGSTROM * run.points(-1).max(axis=0)
     lines += [
         f"set times {{{times}}}",
         f"set time_unit {name}",

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from openmm import unit
 
 from ..errors import InputError
-from ..units.quantities import AVOGADRO, ON_RATE, RATE, in_units_of, non_negative
+from ..units.quantities import AVOGADRO, ON_RATE, RATE, in_units_of, non_negative, shown
 from ..units.types import FloatArray, Scalar
 
 _PER_AMOUNT = unit.liter / unit.mole / unit.second
@@ -22,6 +22,16 @@ def as_on_rate(rate: Scalar, name: str) -> float:
     if isinstance(rate, unit.Quantity) and rate.unit.is_compatible(_PER_AMOUNT):
         rate = in_units_of(rate, ON_RATE / unit.mole, name) / AVOGADRO
     return non_negative(rate, ON_RATE, name)
+
+
+def as_tuple(values: Any, name: str) -> tuple[Any, ...]:
+    """A sequence as a tuple; InputError for what is none, such as a number or a string."""
+    try:
+        if not isinstance(values, (str, bytes)):
+            return tuple(values)
+    except TypeError:
+        pass
+    raise InputError(f"{name} must be a sequence, but is {shown(values)}.")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,7 +57,8 @@ class EndStates:
     Raises
     ------
     InputError
-        For another number of values, a rate that is negative or not finite, or a state that there is not.
+        For another number of values, a rate that is negative or not finite, a state that there is not, or names that
+        are the same.
     """
 
     on_rates: tuple[float, ...]
@@ -71,10 +82,12 @@ class EndStates:
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        for name in ("on_rates", "off_rates", "switch_rates", "after_gain", "after_loss", "names"):
+            as_tuple(getattr(self, name), name)
         count = len(self.on_rates)
         if not 1 <= count <= _MOST_STATES:
             raise InputError(f"An end has from 1 to {_MOST_STATES} states, but on_rates has {count} values.")
-        rows = list(self.switch_rates)
+        rows = [as_tuple(row, "switch_rates") for row in self.switch_rates]
         if len(self.off_rates) != count or len(rows) != count or any(len(row) != count for row in rows):
             raise InputError(
                 f"on_rates has {count} values: off_rates must have as many, and switch_rates {count} x {count}."
@@ -93,8 +106,8 @@ class EndStates:
                 raise InputError(f"{name} must have a number of a state, from 0 to {count - 1}, for each of {count}.")
             object.__setattr__(self, name, tuple(int(state) for state in after))
         names = tuple(self.names) or tuple(map(str, range(count)))
-        if len(names) != count or not all(isinstance(name, str) for name in names):
-            raise InputError(f"names must have a string for each of {count} states.")
+        if len(names) != count or not all(isinstance(name, str) for name in names) or len(set(names)) < count:
+            raise InputError(f"names must have a string of its own for each of {count} states.")
         object.__setattr__(self, "names", names)
 
     def find(self, name: str) -> int:

@@ -97,6 +97,11 @@ class Filament:
         return len(self.positions) - (0 if self.closed else 1)
 
     @property
+    def may_be_absent(self) -> bool:
+        """Whether it is not there at times, with all of its particles in one place."""
+        return self.is_reserve or (self.growth is not None and self.growth.vanishes)
+
+    @property
     def bends(self) -> int:
         """Number of bends that have an energy: joints, or beam elements, which bend themselves."""
         return self.type.segment_kind.bends(self.segments, self.closed)

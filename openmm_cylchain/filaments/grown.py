@@ -25,9 +25,11 @@ def count_nodes_of_monomers(monomers: IntArray, per_segment: IntArray | int) -> 
 
 
 def monomers_of_segments(monomers: IntArray, per_segment: int) -> IntArray:
-    """Of how many monomers the segments (segments,) of a filament are."""
+    """Of how many monomers the segments (segments,) of a filament are; none where there is no filament."""
     first, last = monomers
     nodes = int(count_nodes_of_monomers(np.asarray(monomers), per_segment))
+    if nodes == 0:
+        return np.zeros(0, dtype=int)
     joint = -((-(first + per_segment // 2)) // per_segment)
     joints = per_segment * (joint + np.arange(nodes - 2))
     return np.diff(np.concatenate([[first], joints, [last]])).astype(int)
@@ -52,7 +54,7 @@ def longest_segment(filament: Filament) -> float:
 
 
 class GrownChain:
-    """The segments of a filament that has grown.
+    """The segments of a filament that has grown, or of one that is not there now: none.
 
     Parameters
     ----------
@@ -68,16 +70,15 @@ class GrownChain:
     def __init__(self, kind: FilamentType, monomer_length: float, monomers: IntArray, particles: FloatArray) -> None:
         self._kind, self._monomer_length = kind, monomer_length
         self._numbers = monomers_of_segments(monomers, round(kind.segment_length / monomer_length))
-        nodes = len(self._numbers) + 1
-        if len(particles) < nodes:
-            raise InputError(f"{nodes} nodes are needed for so many monomers, but there are {len(particles)}.")
-        self._vectors = segment_vectors(particles[:nodes], False)
+        if len(particles) < self.nodes:
+            raise InputError(f"{self.nodes} nodes are needed for so many monomers, but there are {len(particles)}.")
+        self._vectors = segment_vectors(particles[: self.nodes], False)
         self._lengths = np.linalg.norm(self._vectors, axis=1)
 
     @property
     def nodes(self) -> int:
-        """How many nodes it has."""
-        return len(self._numbers) + 1
+        """How many nodes it has: none where there is no filament."""
+        return len(self._numbers) + 1 if len(self._numbers) else 0
 
     @property
     def energies(self) -> tuple[float, float]:

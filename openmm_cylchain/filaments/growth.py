@@ -26,13 +26,16 @@ from ..units.quantities import (
 )
 from ..units.types import FloatArray, Indices, Scalar
 from .chain_type import ChainType
-from .end_states import GROWING, SHRINKING, DynamicInstability, EndStates, TwoUnitCap, as_on_rate
+from .end_states import GROWING, SHRINKING, DynamicInstability, EndStates, TwoUnitCap, as_on_rate, as_tuple
 from .filament_type import FilamentType
+from .severing import Severing
 
 _SAME_LENGTH = 1e-6
 """By what share the length of a segment may differ from that of its monomers."""
 _MOST_MONOMERS_OF_SEGMENT = 100_000
 _MOST_MONOMERS_OF_POOL = 1e15
+_NEW = "new"
+"""The name of the state that monomers come in, of those that age."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,9 +134,12 @@ class Monomers:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "aging", tuple(self.aging))
+        object.__setattr__(self, "aging", as_tuple(self.aging, "aging"))
         for state in self.aging:
             require_kind(state, MonomerState, "aging")
+        names = [_NEW, *(state.name for state in self.aging)]
+        if len(set(names)) < len(names):
+            raise InputError(f"States of monomers need names of their own, but are {', '.join(names)}.")
         object.__setattr__(self, "length", positive(self.length, LENGTH, "length of a monomer"))
         for end in ("plus", "minus"):
             on, off = f"{end}_on_rate", f"{end}_off_rate"
@@ -155,7 +161,7 @@ class Monomers:
             off_rates=off_rates,
             switch_rates=switches.tolist(),
             after_gain=[0] * len(on_rates),
-            names=("new", *(state.name for state in self.aging)) if self.aging else (GROWING,),
+            names=(_NEW, *(state.name for state in self.aging)) if self.aging else (GROWING,),
         )
 
     @property
@@ -208,48 +214,6 @@ class MonomerPool:
                     f"A pool of {self.concentration * self.volume:.3g} monomers has more than the "
                     f"{_MOST_MONOMERS_OF_POOL:.0e} that are counted one by one: leave its volume out."
                 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Severing:
-    """How a filament is cut at random, between any two of its monomers.
-
-    Both parts are filaments then, and lengths and bends keep their equilibrium. The part at the plus end becomes one of
-    those that ``Filaments.add_reserve`` has added. A part that is shorter than ``Growth.shortest`` vanishes if its
-    filament ``vanishes``, and filaments are not cut there if not.
-
-    Cofilin of fission yeast cuts filaments of ADP-actin 0.032 times per second in 1000 monomers, 0.012/s in each um, at
-    the concentration at which it cuts most (Chen and Pollard, J. Cell Biol. 2011, 195, 485).
-
-    Parameters
-    ----------
-    rate : 1/(length*time)
-        How often in a length.
-    of_states : sequence of str, optional
-        Of monomers with states (``Monomers.aging``): the names of those before which it is cut; any if not given.
-    shrinks : bool
-        New plus ends shrink, where these have a dynamic instability.
-
-    The attributes hold plain numbers, in 1/(nm ps).
-
-    Raises
-    ------
-    InputError
-        For a rate that is negative or not finite.
-    """
-
-    rate: float
-    of_states: tuple[str, ...] = ()
-    shrinks: bool = False
-
-    if TYPE_CHECKING:
-
-        def __init__(self, *, rate: Scalar, of_states: Sequence[str] = (), shrinks: bool = False) -> None: ...
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rate", non_negative(self.rate, RATE / LENGTH, "rate of severing"))
-        object.__setattr__(self, "of_states", tuple(self.of_states))
-        true_or_false(self.shrinks, "Severing: shrinks")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -357,6 +321,8 @@ class Growth:
                     raise InputError(f"The {end} end is capped, and has a dynamic instability: leave one of them out.")
         if self.severing is not None:
             require_kind(self.severing, Severing, "severing")
+            if self.severing.of_states and not self.monomers.aging:
+                raise InputError("Monomers that do not age have no states: leave of_states of their Severing out.")
             for state in self.severing.of_states:
                 self.monomers.states("plus").find(state)
             if self.severing.shrinks:
@@ -435,6 +401,11 @@ def check_growth(
         _shortest_segment(filament_type, growth, min(fewest, per_segment // 2))
     except InputError as error:
         raise InputError(f"{label}: {error}") from None
+    if fewest * growth.monomers.length > growth.longest * (1.0 + _SAME_LENGTH):
+        raise InputError(
+            f"{label}: it is {fewest * growth.monomers.length:g} nm long where it is shortest, which exceeds its "
+            f"longest, {growth.longest:g} nm. Give its growth a shortest, or take shorter segments."
+        )
     if segments is None:
         return growth.count_nodes(filament_type)
     if growth.vanishes and tuple(clamped):

@@ -139,7 +139,7 @@ class StraightSegments(SegmentKind):
         if closed:
             return 0.5 * (at_joints + np.roll(at_joints, -1))
         if not len(at_joints):
-            return np.zeros(1)
+            return np.zeros(len(tangents))
         padded = np.concatenate([at_joints[:1], at_joints, at_joints[-1:]])
         return 0.5 * (padded[1:] + padded[:-1])
 

@@ -10,6 +10,8 @@ import numpy as np
 
 from ..couplings.shapes import Box, Sphere
 from ..errors import InputError
+from ..filaments.filament_type import FilamentType
+from ..filaments.growth import Growth
 from ..units.quantities import (
     ANGLE,
     ENERGY,
@@ -118,12 +120,27 @@ class Branching(Nucleation):
             force = positive(self.debranching_force, FORCE, "Branching: debranching_force")
             object.__setattr__(self, "debranching_force", force)
         if self.mothers is not None:
-            object.__setattr__(self, "mothers", tuple(whole_numbers(self.mothers, 0, "Branching: mothers")))
+            mothers = tuple(whole_numbers(self.mothers, 0, "Branching: mothers"))
+            if not mothers:
+                raise InputError("Branching: mothers has no filament: leave it out for all that grow.")
+            if len(set(mothers)) < len(mothers):
+                raise InputError(f"Branching: mothers has a filament twice: {list(mothers)}.")
+            object.__setattr__(self, "mothers", mothers)
         if not (self.angle < np.pi and abs(self._slope) > 0.1 * self.lever):
             raise InputError(
                 f"A strut at a lever of {self.lever:g} nm does not hold an angle of {np.rad2deg(self.angle):g} "
                 "degrees: take another angle or lever."
             )
+
+    def monomers(self, growth: Growth, filament_type: FilamentType) -> int:
+        """As that of ``Nucleation``; InputError also for branches that a strut cannot hold."""
+        number = super().monomers(growth, filament_type)
+        if number * growth.monomers.length < self.lever:
+            raise InputError(
+                f"Branches begin with {number * growth.monomers.length:g} nm, on which the strut of their joint, at "
+                f"the lever {self.lever:g} nm, finds no place: give them a larger length."
+            )
+        return number
 
     def whole_rate(self, box: object) -> float:
         """J in 1/ps for each length of mothers in nm."""

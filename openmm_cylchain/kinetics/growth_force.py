@@ -114,9 +114,6 @@ def _set_ends(force, index, growth):
 
 def _add_nucleator(force, filament, indices, box):
     nucleation, growth = filament.nucleation, filament.growth
-    monomers = growth.fewest_monomers(filament.type)
-    if nucleation.length is not None:
-        monomers = round(nucleation.length / growth.monomers.length)
     direction = np.zeros(3) if nucleation.direction is None else nucleation.direction
     rate = nucleation.whole_rate(box)
     if isinstance(nucleation, Branching):
@@ -124,7 +121,7 @@ def _add_nucleator(force, filament, indices, box):
     force.addNucleator(
         rate,
         nucleation.order,
-        monomers,
+        nucleation.monomers(growth, filament.type),
         *nucleation.described_region,
         openmm.Vec3(*direction),
         indices,
@@ -272,9 +269,6 @@ def contours_in(context: openmm.Context, filaments: Sequence[Filament]) -> list[
     for number, monomers in zip(present.filaments, present.monomers):
         filament = filaments[number]
         length = filament.growth.monomers.length
-        if monomers[0] == monomers[1]:
-            contours[number] = np.zeros(1)
-            continue
         rest = rest_lengths(monomers, filament.growth.monomers_per_segment(filament.type), length)
         contours[number] = monomers[0] * length + np.concatenate([[0.0], np.cumsum(rest)])
     return contours

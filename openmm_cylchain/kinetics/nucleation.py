@@ -10,6 +10,8 @@ from openmm import unit
 
 from ..couplings.shapes import Box, Sphere
 from ..errors import InputError
+from ..filaments.filament_type import FilamentType
+from ..filaments.growth import Growth
 from ..units.quantities import (
     AVOGADRO,
     LENGTH,
@@ -20,6 +22,7 @@ from ..units.quantities import (
     positive,
     require_kind,
     shown,
+    unit_vector,
     vector,
     whole_number,
 )
@@ -97,9 +100,7 @@ class Nucleation:
             object.__setattr__(self, "length", positive(self.length, LENGTH, "length of new filaments"))
         if self.direction is not None:
             direction = vector(self.direction, unit.dimensionless, "direction of new filaments")
-            if not (np.all(np.isfinite(direction)) and np.any(direction != 0.0)):
-                raise InputError("The direction of new filaments must be finite and not zero.")
-            object.__setattr__(self, "direction", direction / np.linalg.norm(direction))
+            object.__setattr__(self, "direction", unit_vector(direction, "Nucleation"))
         whole_number(self.order, 0, "order of nucleation")
 
     def whole_rate(self, box: FloatArray | None) -> float:
@@ -107,6 +108,19 @@ class Nucleation:
         if self.region is None and box is None:
             raise InputError("A Nucleation needs a region, a Sphere or a Box, since the System has no periodic box.")
         return self.rate * self._volume(box) if self.is_per_volume else self.rate
+
+    def monomers(self, growth: Growth, filament_type: FilamentType) -> int:
+        """How many monomers a new filament has; InputError if it cannot have so many."""
+        fewest, longest = growth.fewest_monomers(filament_type), growth.longest
+        if self.length is None:
+            return fewest
+        number = round(self.length / growth.monomers.length)
+        if number < fewest or number * growth.monomers.length > longest * (1.0 + 1e-6):
+            raise InputError(
+                f"New filaments of {self.length:g} nm are not between the shortest and the longest of their growth, "
+                f"{fewest * growth.monomers.length:g} and {longest:g} nm."
+            )
+        return number
 
     def _volume(self, box):
         if self.region is None:

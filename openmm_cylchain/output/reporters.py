@@ -152,7 +152,8 @@ class FilamentReporter(FilamentsReporter):
 
     Columns: ``stretching_energy`` and ``bending_energy`` in kJ/mol, ``end_to_end_distance`` and ``contour_length`` in
     nm. ``reporter["contour_length"]`` is an array (reports, filaments). The ends of a ring are one, at distance 0.
-    Energies of filaments that grow are those of the segments that they have at a report.
+    Energies of filaments that grow are those of the segments that they have at a report; all is NaN of one that is not
+    there.
 
     Parameters
     ----------
@@ -195,7 +196,10 @@ def _describe(filament, nodes, control_points, temperature, monomers):
     if monomers is None:
         energies = filament.energies(nodes, control_points, temperature)
     else:
-        energies = GrownChain(filament.type, filament.growth.monomers.length, monomers, nodes).energies
+        chain = GrownChain(filament.type, filament.growth.monomers.length, monomers, nodes)
+        if not chain.nodes:
+            return (np.nan,) * 4
+        energies = chain.energies
     end_to_end_distance = 0.0 if filament.closed else np.linalg.norm(nodes[-1] - nodes[0])
     lengths = filament.type.segment_kind.lengths(nodes, control_points, filament.closed)
     return *energies, end_to_end_distance, lengths.sum()

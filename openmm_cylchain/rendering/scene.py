@@ -36,7 +36,8 @@ class Look:
     Attributes
     ----------
     color : {"type", "tension", "orientation", "bending"}
-        Of filaments. The orientation is the angle of a segment with the director of the first frame that is drawn.
+        Of filaments. The orientation is the angle of a segment with the director of the first frame that is drawn
+        with filaments.
     diameter : float or None
         Of all tubes in nm; 0 for that of each filament, None for that or one that can be seen.
     whole : bool
@@ -112,6 +113,8 @@ class Scene:
         values = None if self.scale is None else _values(self.run, self.look, self._director, frame)
         colors = filament_colors(self.run)
         for number, (own, points) in enumerate(zip(self.run.filaments, self.run.curves(frame))):
+            if not len(points):
+                continue
             ends = np.stack([points, np.roll(points, -1, axis=0)], axis=1)[: len(points) - (not own.ring)]
             color = np.tile(_rgb(colors[own.label]), (len(ends), 1))
             if self.scale is not None and values is not None:
@@ -195,7 +198,7 @@ def make_scene(run: Run, look: Look, frames: list[int]) -> Scene:
     # Tubes and balls stand out from the points by half their width.
     widest = max(diameters.max(), *balls) if balls else diameters.max()
     points = np.concatenate([points + 0.5 * widest, points - 0.5 * widest])
-    axis = director(np.concatenate(_segments(run, frames[0]))) if look.color == "orientation" else None
+    axis = _first_director(run, frames) if look.color == "orientation" else None
     scale = _color_scale(run, look, axis, frames)
     fixed = _lines(box_edges(run) + wall_lines(run, points), _LINE_WIDTH * extent)
     return Scene(run, look, points, diameters, balls, legend_of(run, look), scale, axis, fixed)
@@ -224,11 +227,19 @@ def _framed_points(run, look, frames):
     points = np.concatenate(
         [points, *(run.positions(frame)[own.indices] for frame in sampled for own in look.particles_of(run))]
     )
+    if not len(points):
+        points = run.positions(frames[0])
     return np.concatenate([points, *wall_lines(run, points)])
 
 
 def _rgb(color):
     return np.array(matplotlib.colors.to_rgb(color))
+
+
+def _first_director(run, frames):
+    # Of the first frame with a filament; any where there is none.
+    vectors = (np.concatenate(_segments(run, frame)) for frame in frames)
+    return next((director(own) for own in vectors if len(own)), np.array([1.0, 0.0, 0.0]))
 
 
 def _segments(run, frame):
@@ -254,6 +265,7 @@ def _color_scale(run, look, axis, frames):
         return ColorScale("angle to the director (°)", "viridis", 0.0, 90.0)
     sampled = {frames[round(place)] for place in np.linspace(0, len(frames) - 1, min(len(frames), 8))}
     values = np.concatenate([np.concatenate(_values(run, look, axis, frame)) for frame in sampled])
+    values = values if len(values) else np.zeros(1)
     if look.color == "bending":
         return ColorScale("angle between segments (°)", "viridis", 0.0, float(np.quantile(values, 0.98)) or 1.0)
     largest = float(np.quantile(np.abs(values), 0.98)) or 1.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..errors import InputError
 from ..filaments import shapes
 from ..filaments.chain_type import ChainType
 from ..filaments.filament import Filament
+from ..filaments.filament_type import FilamentType
 from ..filaments.growth import Growth
 from ..filaments.shapes import FilamentOptions
 from ..kinetics.nucleation import Nucleation, require_nucleation
@@ -23,6 +25,14 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 _MOST_KINDS = 4
+_RESERVE_DISTANCE, _RESERVE_ROW = 10.0, 50
+"""In nm, and how many are in a row of the lattice of those that have not begun."""
+
+
+def _reserve_place(number):
+    # Beside the middle of the region of nucleation, on a lattice that all have in common.
+    row = _RESERVE_ROW
+    return _RESERVE_DISTANCE * np.array([number % row, number // row % row, number // row**2], dtype=float)
 
 
 class AddedFilaments:
@@ -276,9 +286,15 @@ class AddedFilaments:
             )
         require_nucleation(nucleation)
         filament = shapes.reserve_filament(filament_type, label, growth, nucleation, planar, propulsion)
-        first = len(self)
-        self._filaments += [filament] * whole_number(count, 1, f"{label}: count")
-        return range(first, len(self))
+        if nucleation is not None and isinstance(filament_type, FilamentType):
+            try:
+                nucleation.monomers(growth, filament_type)
+            except InputError as error:
+                raise InputError(f"{label}: {error}") from None
+        numbers = range(len(self), len(self) + whole_number(count, 1, f"{label}: count"))
+        # Apart from each other, since forces between all particles of a System divide by distances.
+        self._filaments += [replace(filament, positions=filament.positions + _reserve_place(own)) for own in numbers]
+        return numbers
 
     def _refuse_if_built(self, label):
         if self._nodes is not None:

@@ -10,7 +10,7 @@ import openmm
 from openmm import unit
 
 from ..couplings.growing_chains import refuse_forces_on_growing
-from ..couplings.periodicity import is_periodic
+from ..couplings.periodicity import default_box, is_periodic
 from ..couplings.stiff_joints import warn_of_stiff_joints
 from ..engine_choice import default_scheme
 from ..engines.description import describe_chains, filament_label, refuse_constraints
@@ -196,7 +196,10 @@ class Filaments(TiedFilaments):
 
     def _coinciding(self):
         for number, nodes in enumerate(self._nodes):
-            if self._filaments[number].spare_nodes:
+            own = self._filaments[number]
+            if own.may_be_absent:
+                yield tuple(nodes.tolist())
+            elif own.spare_nodes:
                 # Any node but the first may become a spare one.
                 yield tuple(nodes[1:].tolist())
             mine = self._attachments_of[number]
@@ -371,7 +374,7 @@ class Filaments(TiedFilaments):
                 refuse_modes(filament, filament_label(number, filament))
         if scheme not in IMPLICIT_SCHEMES:
             refuse_growth(self, f"scheme {scheme!r}", "Take an implicit one.")
-        refuse_countless_monomers(self, step_size)
+        refuse_countless_monomers(list(self), step_size, default_box(system) if is_periodic(system) else None)
         refuse_forces_on_growing(system)
         flow = as_flow(flow)
         warn_of_forces_without_images(system)

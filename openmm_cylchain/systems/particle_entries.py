@@ -85,8 +85,9 @@ def _refuse_force(force, label, may_coincide):
 
 
 def _refuse_same_places(system, positions, filaments, label):
-    # Nodes and particles that are there; control points are beside nodes.
-    places = np.concatenate([positions, *(filament.positions for filament in filaments)])
+    # Nodes and particles that are there; control points are beside nodes. Of a filament that has not begun, one node.
+    nodes = [own.positions[:1] if own.is_reserve else own.positions for own in filaments]
+    places = np.concatenate([positions, *nodes])
     if is_periodic(system):
         places = np.round(places @ np.linalg.inv(default_box(system)), 9) % 1.0
     _, first, which = np.unique(np.round(places, 9), axis=0, return_index=True, return_inverse=True)
@@ -94,7 +95,7 @@ def _refuse_same_places(system, positions, filaments, label):
     found = found[found >= len(positions)]
     if not len(found):
         return
-    owners = [(number, node) for number, own in enumerate(filaments) for node in range(len(own.positions))]
+    owners = [(number, node) for number, own in enumerate(nodes) for node in range(len(own))]
     number, node = owners[found[0] - len(positions)]
     other = first[which.reshape(-1)[found[0]]]
     where = f"particle {other}"

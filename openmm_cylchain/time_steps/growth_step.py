@@ -10,7 +10,7 @@ small. Where a step has hard contacts, neither speeds nor the force at which an 
 
 import math
 import warnings
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 import openmm
 
@@ -22,8 +22,9 @@ from ..filaments.collection import FilamentCollection
 from ..filaments.filament import Filament
 from ..filaments.filament_type import FilamentType
 from ..filaments.growth import segment_of_length
+from ..kinetics.branching import Branching
 from ..units.text import format_time
-from ..units.types import Numbers
+from ..units.types import FloatArray, Numbers
 from .coupled_forces import CoupledForces
 from .hard_contacts import longest_resolving_step
 from .time_step import TimeStep
@@ -92,15 +93,32 @@ def warn_if_growth_is_not_resolved(filaments: FilamentCollection, system: openmm
         )
 
 
-def refuse_countless_monomers(filaments: Iterable[Filament], step: float) -> None:
-    """Raise InputError if a filament gains and loses more than 100000 monomers in a step, in ps."""
+def refuse_countless_monomers(filaments: Sequence[Filament], step: float, box: FloatArray | None) -> None:
+    """Raise InputError if a filament gains and loses more than 100000 monomers in a step, in ps, or so many begin."""
+    first: dict[int, tuple[int, Filament]] = {}
+    for number, own in enumerate(filaments):
+        if own.nucleation is not None:
+            first.setdefault(id(own.nucleation), (number, own))
+    for number, own in first.values():
+        rate = own.nucleation.whole_rate(box)
+        if isinstance(own.nucleation, Branching):
+            rate *= sum(other.growth.longest for other in filaments if other.growth is not None)
+        if step * rate > _MOST_EVENTS:
+            raise InputError(
+                f"Of the reserve from filament {number} ({own.type.name}) on, {_PER_SECOND * rate:.3g} would begin per "
+                f"second, which are {step * rate:.3g} in a time step of {format_time(step, 4)}. Check the units of its "
+                "nucleation."
+            )
     for number, filament in enumerate(filaments):
         rate = sum(_events(filament, end) for end in ("minus", "plus"))
+        severing = None if filament.growth is None else filament.growth.severing
+        if filament.growth is not None and severing is not None:
+            rate += severing.rate * filament.growth.longest
         if step * rate > _MOST_EVENTS:
             raise InputError(
                 f"Filament {number} ({filament.type.name}) gains and loses {_PER_SECOND * rate:.3g} monomers per "
-                f"second, or turns so often: {step * rate:.3g} times in a time step of {format_time(step, 4)}. Check "
-                "the units of its rates and of its pool."
+                f"second, or turns or is cut so often: {step * rate:.3g} times in a time step of "
+                f"{format_time(step, 4)}. Check the units of its rates and of its pool."
             )
 
 

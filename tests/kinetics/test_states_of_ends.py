@@ -1,0 +1,154 @@
+"""Ends with states: monomers that age, and caps of two units, against theory and a simulation of their own."""
+
+import numpy as np
+import openmm
+import pytest
+from openmm import unit
+
+from openmm_cylchain import (
+    F_ACTIN,
+    EndStates,
+    Filaments,
+    Growth,
+    MonomerPool,
+    Monomers,
+    MonomerState,
+    TwoUnitCap,
+)
+
+pytest.importorskip("openmm_cylchain.plugin")
+
+TEMPERATURE, WATER = 300.0, 1e-3 * unit.pascal * unit.second
+MONOMER, PER_SEGMENT = 2.7, 40
+ACTIN = F_ACTIN.with_segment_length(PER_SEGMENT * MONOMER)
+POOL = MonomerPool(1e-4)
+STEP = 1e7
+
+
+def contexts_of(growth, count, segments, step=STEP):
+    filaments = Filaments(WATER, TEMPERATURE)
+    for number in range(count):
+        filaments.add_straight(ACTIN, segments, [0, 0, 50.0 * number], [1, 0, 0], growth=growth)
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, step, random_seed=3, checks=False)
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName("CPU"), {"Threads": "1"})
+    context.setPositions(positions)
+    return filaments, context
+
+
+def mean_within(samples, expected, bias):
+    """The mean of samples is as expected; their error is so small that a bias would show."""
+    samples = np.asarray(samples, dtype=float)
+    error = samples.std(ddof=1) / np.sqrt(len(samples))
+    assert error < bias * abs(expected) / 4.0, (samples.mean(), expected, error)
+    assert abs(samples.mean() - expected) < 4.0 * error, (samples.mean(), expected, error)
+
+
+def simulated_aging(gain, losses, aging, count, monomers, steps, most, parts=200):
+    """Filaments whose monomers age: plus ends gain and lose as what is last there; rates are per step.
+
+    Of what each end has moved by after so many steps, (count, 2), minus and plus; gain is that of the plus end, and
+    losses are those of the minus and the plus end in each state.
+    """
+    generator = np.random.default_rng(11)
+    ripe = np.full((len(aging), count, most), -1.0)
+    first, last = np.full(count, most // 4), np.full(count, most // 4 + monomers)
+    which, moved = np.arange(count), np.zeros((count, 2), dtype=int)
+    for part in range(steps * parts):
+        now = part / parts
+        state = [np.sum(ripe[:, which, end] < now, axis=0) for end in (first, last - 1)]
+        chances = generator.uniform(size=(3, count)) * parts
+        lost_minus, lost_plus = (chances[end] < losses[end][state[end]] for end in (0, 1))
+        gained = chances[2] < gain
+        first, last = first + lost_minus, last - lost_plus
+        moved += np.column_stack([-1 * lost_minus, gained.astype(int) - lost_plus])
+        new = np.flatnonzero(gained)
+        ripe[:, new, last[new]] = now + np.cumsum(
+            generator.exponential(1.0 / aging[:, None], (len(aging), len(new))), 0
+        )
+        last = last + gained
+    return moved
+
+
+@pytest.mark.parametrize(
+    ("count", "steps"),
+    [(400, 12), pytest.param(3000, 30, marks=pytest.mark.slow)],
+)
+def test_ends_of_monomers_that_age(count, steps):
+    """Both ends gain and lose as a simulation of a few lines does; monomers of the start are old."""
+    gain, losses, aging = 2.0, np.array([[0.1, 0.05, 0.5], [0.1, 0.3, 6.0]]), np.array([2.0, 1.0])
+    states = [
+        MonomerState(
+            name=f"state {number}",
+            rate=aging[number] / STEP,
+            minus_off_rate=losses[0, number + 1] / STEP,
+            plus_off_rate=losses[1, number + 1] / STEP,
+        )
+        for number in (0, 1)
+    ]
+    monomers = Monomers(
+        length=MONOMER,
+        plus_on_rate=gain / STEP / POOL.concentration,
+        plus_off_rate=losses[1, 0] / STEP,
+        minus_off_rate=losses[0, 0] / STEP,
+        aging=states,
+    )
+    filaments, context = contexts_of(Growth(monomers=monomers, pool=POOL, longest=1500.0), count, 4)
+    context.getIntegrator().step(steps)
+    found = filaments.in_context(context).growth()
+    moved = (found.gained - found.lost).astype(float)
+    expected = simulated_aging(gain, losses, aging, count, 4 * PER_SEGMENT, steps, 800)
+    for end in (0, 1):
+        error = np.hypot(*(own[:, end].std(ddof=1) / np.sqrt(count) for own in (moved, expected)))
+        assert abs(moved[:, end].mean() - expected[:, end].mean()) < 4.0 * error, (end, moved[:, end].mean(), error)
+        spread = expected[:, end].var(ddof=1)
+        assert moved[:, end].var(ddof=1) == pytest.approx(spread, rel=4.0 * np.sqrt(4.0 / count))
+    # An end whose monomers were all new, or all old, would be far from that.
+    error = moved[:, 1].std() / np.sqrt(count)
+    for state in (0, 2):
+        assert abs(steps * (gain - losses[1, state]) - moved[:, 1].mean()) > 8.0 * error
+    assert np.all(found.end_states[:, 0] == 2) and set(found.end_states[:, 1]) == {0, 1, 2}
+
+
+@pytest.mark.parametrize(("count", "steps"), [(100, 300), pytest.param(400, 1000, marks=pytest.mark.slow)])
+def test_caps_of_two_units(count, steps):
+    """The mean time to a catastrophe, 1/h + (g+h)^2/(h^2 (3g+2h)), from the rate of their cycles with fast rescues."""
+    gain, hydrolysis, rescue = 3.0, 1.0, 2.0
+    cap = TwoUnitCap(hydrolysis_rate=hydrolysis / STEP, shrinking_off_rate=100.0 / STEP, rescue_rate=rescue / STEP)
+    monomers = Monomers(length=MONOMER, plus_on_rate=gain / STEP / POOL.concentration)
+    growth = Growth(monomers=monomers, pool=POOL, longest=500.0, plus_instability=cap, minus_capped=True)
+    filaments, context = contexts_of(growth, count, 1)
+    context.getIntegrator().step(20)
+    before = filaments.in_context(context).growth().catastrophes[:, 1]
+    context.getIntegrator().step(steps)
+    found = filaments.in_context(context).growth()
+    mean = 1.0 / hydrolysis + (gain + hydrolysis) ** 2 / (hydrolysis**2 * (3.0 * gain + 2.0 * hydrolysis))
+    mean_within(found.catastrophes[:, 1] - before, steps / (mean + 1.0 / rescue), 0.05)
+    assert 0.1 < found.shrinking[:, 1].mean() < 0.3
+
+
+def test_models_of_states():
+    """A gain that changes the state, and a state that is left by itself: shares of the states in the long run."""
+    states = EndStates(
+        on_rates=np.array([2.0, 0.0, 0.0]) / STEP / POOL.concentration,
+        off_rates=np.array([0.0, 0.0, 1.0]) / STEP,
+        switch_rates=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.5], [3.0, 0.0, 0.0]]) / STEP,
+        after_gain=[1, 1, 2],
+        after_loss=[0, 1, 0],
+        names=["open", "shut", "loose"],
+    )
+    monomers = Monomers(length=MONOMER)
+    growth = Growth(monomers=monomers, pool=POOL, longest=1200.0, plus_instability=states, minus_capped=True)
+    filaments, context = contexts_of(growth, 200, 4)
+    shares = np.zeros(3)
+    context.getIntegrator().step(20)
+    before = filaments.in_context(context).growth()
+    for _ in range(40):
+        context.getIntegrator().step(5)
+        found = filaments.in_context(context).growth()
+        shares += np.bincount(found.end_states[:, 1], minlength=3) / (200.0 * 40.0)
+    # Each cycle is 1/2 open, 2 shut and 1/4 loose, and gains a monomer; it loses it with the chance 1/4.
+    np.testing.assert_allclose(shares, np.array([0.5, 2.0, 0.25]) / 2.75, atol=0.02)
+    mean_within((found.gained - before.gained)[:, 1], 200.0 / 2.75, 0.05)
+    mean_within((found.lost - before.lost)[:, 1], 200.0 / 2.75 / 4.0, 0.12)
+    assert states.net_rate(POOL.concentration) * STEP == pytest.approx(0.75 / 2.75)
