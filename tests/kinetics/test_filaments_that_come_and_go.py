@@ -320,16 +320,19 @@ def test_hands_stay_where_they_hold_filaments_that_are_cut():
     assert np.diff(present, axis=1).sum() == 5 * 24 * PER_SEGMENT
 
 
-@pytest.mark.xfail(strict=True, reason="both ends must have as many states")
 def test_new_plus_ends_shrink_where_minus_ends_have_one_state():
     shrinks = DynamicInstability(catastrophe_rate=0.0, rescue_rate=0.0, shrinking_off_rate=1e-6)
-    severing = Severing(rate=1e-10, shrinks=True)
+    severing = Severing(rate=2e-9, shrinks=True)
     filaments = Filaments(WATER, TEMPERATURE)
     cut = growth(1e-6, 0.0, plus_instability=shrinks, severing=severing, minus_capped=True)
     filaments.add_straight(ACTIN, 5, [0, 0, 0], [1, 0, 0], growth=cut)
     filaments.add_reserve(ACTIN, 3, growth=cut)
     _, system, positions = filaments.build()
-    simulate(filaments, system, positions, 1e6).getIntegrator().step(5)
+    context = simulate(filaments, system, positions, 1e6)
+    context.getIntegrator().step(5)
+    found = filaments.in_context(context).growth()
+    parents = set(found.parents[found.parents >= 0])
+    assert parents and all(found.shrinking[np.isin(found.identities, list(parents)), 1])
 
 
 def everything():
