@@ -50,6 +50,7 @@ from .kinetics.branching import Branching
 from .kinetics.crosslinker import Crosslinker
 from .kinetics.growth_force import FilamentGrowth
 from .kinetics.hand import Hand
+from .kinetics.hand_at_end import HandAtEnd
 from .kinetics.linker_table import LinkerTable
 from .kinetics.nucleation import Nucleation
 from .kinetics.presets import ALPHA_ACTININ, DYNEIN, FILAMIN, KINESIN_1, MYOSIN_II
@@ -70,6 +71,7 @@ from .time_steps.time_step import TimeStep, effective_rate
 from .version import __version__
 
 __all__ = [
+    "HandAtEnd",
     "Branching",
     "TwoUnitCap",
     "Severing",

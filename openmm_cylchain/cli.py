@@ -226,6 +226,8 @@ def _time_step(options):
     configuration = read_configuration(options.configuration)
     solvent, settings = configuration.solvent, configuration.simulation
     for group in configuration.filaments:
+        if group.is_reserve:
+            continue
         arguments = (group.type, solvent.viscosity, solvent.temperature)
         kind, longest = group.type.segment_kind, None
         if group.growth is not None:

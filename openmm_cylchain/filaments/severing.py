@@ -19,6 +19,9 @@ class Severing:
     those that ``Filaments.add_reserve`` has added. A part that is shorter than ``Growth.shortest`` vanishes if its
     filament ``vanishes``, and filaments are not cut there if not.
 
+    Cofilin of fission yeast cuts filaments of ADP-actin 0.032 times per second in 1000 monomers, 0.012/s in each um, at
+    the concentration at which it cuts most (Chen and Pollard, J. Cell Biol. 2011, 195, 485).
+
     Parameters
     ----------
     rate : 1/(length*time)

@@ -21,6 +21,7 @@ from ..units.quantities import (
     true_or_false,
 )
 from ..units.types import Scalar
+from .hand_at_end import HandAtEnd
 
 AT_ENDS = ("release", "hold")
 """What a hand may do at the end of a filament to which it has walked."""
@@ -73,6 +74,8 @@ class Hand:
         of all kinds with the same spacing share their sites.
     binds_to : sequence of FilamentType, BeadSpringType or str, optional
         Types of filaments, or their names; all if not given.
+    filament_end : HandAtEnd, optional
+        What it has to do with an end of filaments that grow.
 
     Raises
     ------
@@ -93,6 +96,7 @@ class Hand:
     at_end: str = "release"
     site_spacing: float | None = None
     binds_to: tuple[str, ...] | None = None
+    filament_end: HandAtEnd | None = None
 
     if TYPE_CHECKING:  # What may be given; the attributes hold plain numbers.
 
@@ -112,6 +116,7 @@ class Hand:
             at_end: str = "release",
             site_spacing: Scalar | None = None,
             binds_to: Sequence[ChainType | str] | None = None,
+            filament_end: HandAtEnd | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -139,6 +144,10 @@ class Hand:
         if self.speed == 0.0 and (self.stall_force is not None or self.walks_backward):
             raise InputError("Hand: stall_force and walks_backward say how it walks, but its speed is zero.")
         one_of(self.at_end, AT_ENDS, "Hand: at_end")
+        if self.filament_end is not None:
+            require_kind(self.filament_end, HandAtEnd, "Hand: filament_end")
+            if self.filament_end.binds_there and self.site_spacing is not None:
+                raise InputError("Hand: one that binds at ends has no sites: leave site_spacing out.")
         if self.binds_to is not None:
             kinds = [self.binds_to] if isinstance(self.binds_to, (str, ChainType)) else self.binds_to
             kinds = kinds if isinstance(kinds, (Sequence, set, frozenset)) else ()

@@ -22,6 +22,7 @@ def rows_of_growth(growth: Any) -> Iterator[tuple[float, ...]]:
         return
     lengths = growth.lengths.value_in_unit(LENGTH)
     concentrations = growth.concentrations.value_in_unit(unit.molar)
+    population = growth.nucleated, growth.vanished, growth.severed, growth.without_place
     for index, filament in enumerate(growth.filaments):
         ends = zip(*(getattr(growth, what)[index] for what in _OF_END))
         yield (
@@ -31,6 +32,9 @@ def rows_of_growth(growth: Any) -> Iterator[tuple[float, ...]]:
             *map(int, growth.monomers[index]),
             *(int(count) for counts in ends for count in counts),
             float(concentrations[index]),
+            int(growth.identities[index]),
+            int(growth.parents[index]),
+            *population,
         )
 
 
@@ -43,6 +47,10 @@ class GrowthReporter(FilamentsReporter):
     ``minus end shrinking``, ``minus end catastrophes``, ``minus end rescues``, and the same of ``plus end``: how many
     monomers each end has gained and lost since the start, how often it would have gained one, but had no spare node,
     whether it shrinks, 0 or 1, and how often it has turned; and ``free monomers (uM)``, the concentration in its pool.
+    A place without a filament has no nodes, and the length zero. ``identity`` says which of all filaments that have
+    ever been there is in it, and ``parent`` of which it was a part, -1 for none; ``filaments nucleated``,
+    ``filaments vanished``, ``filaments severed`` and ``without place`` are counts of all that grow, the same in each
+    line of a report, see ``FilamentGrowth``.
 
     Before these, the file has ``step``, ``time (ms)`` and ``filament``; ``analysis.read_growth`` reads it.
     ``reporter["nodes"]`` is an array (reports, filaments that grow), in the order of ``reporter.filaments``.

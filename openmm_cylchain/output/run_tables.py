@@ -147,6 +147,9 @@ PULLING_TABLE_COLUMNS = (
 
 _EVENTS_OF_END = ("gained (monomers)", "lost (monomers)", "waited", "shrinking", "catastrophes", "rescues")
 
+POPULATION_COLUMNS = ("filaments nucleated", "filaments vanished", "filaments severed", "without place")
+"""How many have, of all that grow, since the start."""
+
 GROWTH_TABLE_COLUMNS = (
     "step",
     "time (ms)",
@@ -157,9 +160,12 @@ GROWTH_TABLE_COLUMNS = (
     "plus end (monomers)",
     *(f"{end} end {event}" for end in ("minus", "plus") for event in _EVENTS_OF_END),
     "free monomers (uM)",
+    "identity",
+    "parent",
+    *POPULATION_COLUMNS,
 )
-"""A line per report and filament that grows; ends are where they are since the start, in monomers along the filament,
-and have waited so often because there was no spare node."""
+"""A line per report and place of a filament that grows, without nodes while there is none; ends are where they are
+since it began, in monomers along the filament, and have waited so often because there was no spare node."""
 
 
 _MEAN_FORCE_COLUMNS = (

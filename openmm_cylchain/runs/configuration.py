@@ -31,11 +31,12 @@ from .tables.couplings import (
     read_tether,
     read_wall,
 )
-from .tables.filament import FILAMENT, MOST_NODES, read_filaments
+from .tables.filament import FILAMENT, MOST_NODES, read_filaments, read_reserve
 from .tables.filament_types import PRESETS as PRESETS
 from .tables.joints import JOINT, read_joint
 from .tables.linkers import HAND, LINKERS, binds_to, read_linkers
 from .tables.monomers import GROWTH, MONOMERS, check_names, check_with_others, read_monomers
+from .tables.nucleation import BRANCHING, NUCLEATION, check_places, read_branching, read_nucleation
 from .tables.particles import PARTICLES, read_particles
 from .tables.simulation import SIMULATION, SimulationSettings, read_seed, read_simulation
 from .tables.solvent import BOX, FLOW, SOLVENT, Solvent, read_flow, read_solvent
@@ -47,6 +48,8 @@ TABLES = (
     FLOW,
     FILAMENT,
     MONOMERS,
+    NUCLEATION,
+    BRANCHING,
     PARTICLES,
     LINKERS,
     LINK,
@@ -66,6 +69,8 @@ _OWNERS = (
     FILAMENT,
     GROWTH,
     MONOMERS,
+    NUCLEATION,
+    BRANCHING,
     LINKERS,
     HAND,
     BOX,
@@ -238,19 +243,37 @@ def _read_tables(raw):
                     f"{kind.name!r} must be a table: write {kind.header} once, with its keys below it.", (kind.name,)
                 )
             tables[kind.name] = [kind.read(found, Place(kind.header, (kind.name,)))]
-    if not tables["filament"]:
+    if not (tables["filament"] or tables["nucleation"]):
         raise InputError("There is no [[filament]] table: add one for every kind of filament.")
     return tables
 
 
 def _filaments(tables, solvent, box, folder, monomers):
-    groups, nodes = [], 0
+    groups, reserves = [], []
     for number, entries in enumerate(tables["filament"], start=1):
-        groups += read_filaments(entries, number, solvent, box, folder, monomers)
-        nodes = sum(group.count * (group.nodes + group.spare_nodes) for group in groups)
-        if nodes > MOST_NODES:
-            raise entries.error(f"makes {nodes:.3g} nodes: there can be {MOST_NODES:.0e} in all.")
+        own = read_filaments(entries, number, solvent, box, folder, monomers)
+        groups += own
+        _check_nodes(entries, groups)
+        reserves.append((entries, own))
+    # Behind all that are there at first, so that these keep their numbers.
+    for entries, own in reserves:
+        groups += filter(None, [read_reserve(entries, own)])
+        _check_nodes(entries, groups)
+    for entries in tables["nucleation"]:
+        groups.append(read_nucleation(entries, groups, solvent, box, monomers))
+        _check_nodes(entries, groups)
+    (contacts,) = tables["contacts"] or (None,)
+    for entries in tables["branching"]:
+        groups.append(read_branching(entries, groups, solvent, monomers, contacts))
+        _check_nodes(entries, groups)
+    check_places(tables, groups)
     return tuple(groups)
+
+
+def _check_nodes(entries, groups):
+    nodes = sum(group.count * (group.nodes + group.spare_nodes) for group in groups)
+    if nodes > MOST_NODES:
+        raise entries.error(f"makes {nodes:.3g} nodes: there can be {MOST_NODES:.0e} in all.")
 
 
 def _start_files(tables, folder):

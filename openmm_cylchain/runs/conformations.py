@@ -45,11 +45,11 @@ class Conformations:
             for group, members in groups
             for load in dict.fromkeys(loads[own] for own in members)
         ]
-        kinds = dict.fromkeys((group.table, load) for group, load, _ in self._groups)
+        kinds = dict.fromkeys((_kind(group), load) for group, load, _ in self._groups)
         self._colours = dict(zip(kinds, colors_of_filaments(len(kinds))))
         self._springs, self._polar = springs, polar
         points = [own[:, :2] for frame in frames for *_, lines in self._lines(frame) for own in lines]
-        points = np.concatenate(points)
+        points = np.concatenate(points or [np.zeros((1, 2))])
         if self._box is not None:
             points = np.array([np.zeros(2), self._box])
         self._lower, self._upper = points.min(axis=0), points.max(axis=0)
@@ -58,14 +58,17 @@ class Conformations:
         # Of each group and load: the curves of its filaments.
         for group, load, members in self._groups:
             curves = [own[0] for own in filament_curves(self._trajectory[frame], members)]
-            yield group, load, [unrolled(own) if group.closed else own for own in curves]
+            # Filaments that are not there have all of their particles in one place.
+            yield group, load, [unrolled(own) if group.closed else own for own in curves if np.ptp(own, axis=0).any()]
 
     def draw(self, axis, frame):
         """Draw a frame, with a legend and a scale bar below."""
         named, ends = set(), []
         for group, load, lines in self._lines(frame):
-            segments = np.concatenate([np.stack([own[:-1, :2], own[1:, :2]], axis=1) for own in lines])
-            kind = group.table, load
+            segments = np.concatenate(
+                [np.zeros((0, 2, 2)), *(np.stack([own[:-1, :2], own[1:, :2]], axis=1) for own in lines)]
+            )
+            kind = _kind(group), load
             label = None if kind in named else self._label(kind)
             self._draw_segments(axis, segments, self._colours[kind], 1.8, 2, label)
             named.add(kind)
@@ -90,8 +93,12 @@ class Conformations:
         _draw_scale_bar(axis)
 
     def _label(self, kind):
-        own = [(group, members) for group, load, members in self._groups if (group.table, load) == kind]
-        (group, _), counts = own[0], sorted({one.segments for one, _ in own})
+        own = [(group, members) for group, load, members in self._groups if (_kind(group), load) == kind]
+        group = own[0][0]
+        own = [(group, members) for group, members in own if not group.is_reserve]
+        if not own:
+            return f"{group.type.name} that begin"
+        counts = sorted({one.segments for one, _ in own})
         text = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
         segments = f"{text} {group.type.segment_kind.name}{'s' * (counts != [1])}"
         label = f"{sum(len(members) for _, members in own)} × {group.type.name}, {segments}"
@@ -123,6 +130,11 @@ class Conformations:
         axis.set_yticks([])
         for spine in axis.spines.values():
             spine.set_color("0.7")
+
+
+def _kind(group):
+    # Places for filaments like those of a [[filament]] table are of their kind.
+    return group.table or group.path
 
 
 def _draw_scale_bar(axis):

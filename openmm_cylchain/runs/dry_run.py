@@ -2,17 +2,20 @@
 
 import tempfile
 
+from ..kinetics.branching import Branching
 from ..output.run_tables import ENERGY_COLUMNS, GROWTH_TABLE_COLUMNS, LINKER_TABLE_COLUMNS
 from ..units.text import format_time
 from .configuration import linker_labels, named_bound
 from .errors_of_tables import located_instability
-from .growth_summary import ENDS, MICROMOLAR, free_rate
-from .initial_state import recommended_step
+from .growth_summary import ENDS, MICROMOLAR, free_rate, populations
+from .initial_state import box_vectors, recommended_step
 from .run import Recorder, begin, create_simulation, steps
 from .run_directory import RunDirectory
-from .summary import group_labels
+from .steady_populations import steady_population
+from .summary import group_labels, group_members
 
 _MEASURED_SECONDS = 3.0
+_PER_SECOND, _PER_SECOND_AND_UM = 1e12, 1e15
 _BYTES_OF_NUMBER = 20
 """Of a number in a table, with its comma."""
 
@@ -38,13 +41,19 @@ def dry_run(configuration):
 
 def _what_is_built(configuration, built):
     filaments, system = built.filaments, built.system
-    segments = sum(filament.segments for filament in filaments)
-    counts = ((len(filaments), "filament"), (segments, "segment"), (system.getNumParticles(), "particle"))
+    there = [filament for filament in filaments if not filament.is_reserve]
+    segments = sum(filament.segments for filament in there)
+    counts = [(len(there), "filament"), (segments, "segment"), (system.getNumParticles(), "particle")]
+    if len(there) < len(filaments):
+        counts.append((len(filaments) - len(there), "place for filaments that come", "places for filaments that come"))
     yield f"  {', '.join(_counted(*one) for one in counts)}"
     for label, group in zip(group_labels(configuration), configuration.filaments):
         yield f"    {label}"
         if group.growth is not None:
             yield f"      {_growth_of(group)}"
+        if group.nucleation is not None:
+            yield f"      {_beginnings(group, configuration.box)}"
+    yield from _populations(configuration)
     yield from (f"    {own.count} × {own.name}, {own.diameter:g} nm" for own in configuration.particles)
     for label, own in zip(linker_labels(configuration), configuration.linkers):
         count = len(own.anchors) if own.anchors is not None else own.count
@@ -70,8 +79,25 @@ def _growth_of(group):
     return f"{' and '.join(gains)}, where it is free, at {concentration:.4g} uM; {nodes}"
 
 
-def _counted(count, what):
-    return f"{count} {what}{'' if count == 1 else 's'}"
+def _beginnings(group, box):
+    rate = group.nucleation.whole_rate(box_vectors(box))
+    if isinstance(group.nucleation, Branching):
+        return f"{rate * _PER_SECOND_AND_UM:.3g} begin per second on each um of mothers"
+    return f"{rate * _PER_SECOND:.3g} begin per second"
+
+
+def _populations(configuration):
+    for groups, _, name in populations(configuration, group_members(configuration)):
+        free = steady_population(groups, box_vectors(configuration.box), groups[0].growth.pool.concentration)
+        if free is not None:
+            yield (
+                f"    {name}: {free.number:.3g} at once in the long run, {free.length:.4g} nm long on average, where "
+                f"they are free; {_counted(sum(group.count for group in groups), 'place')}"
+            )
+
+
+def _counted(count, what, several=None):
+    return f"{count} {what if count == 1 else several or what + 's'}"
 
 
 def _binding(configuration, recommended):

@@ -83,6 +83,6 @@ def _path_of(message, configuration):
 def _path_of_filament(number, configuration):
     for group in configuration.filaments:
         if number < group.count:
-            return "filament", group.table - 1
+            return group.path
         number -= group.count
     return ()

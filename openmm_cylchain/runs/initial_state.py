@@ -151,9 +151,14 @@ def place_filaments(configuration, engine, seed, kinetics=True):
     planar = None if configuration.contacts is None else PlanarSegments(box_vectors(box))
     messages = ProgressMessages()
     progress = LateMessages(
-        messages, "filaments are placed: {} of {}", sum(own.count for own in configuration.filaments)
+        messages,
+        "filaments are placed: {} of {}",
+        sum(own.count for own in configuration.filaments if not own.is_reserve),
     )
     for group in configuration.filaments:
+        if group.is_reserve:
+            _add_reserve(filaments, group, kinetics, configuration.tables)
+            continue
         for index in range(group.count):
             progress.one_is_done()
             number = len(filaments)
@@ -196,11 +201,35 @@ def box_vectors(box):
     return None if box is None else np.diag(box)
 
 
-def _add(filaments, group, nodes, control_points, kinetics):
+def _growth(group, kinetics):
     growth = group.growth
     if growth is not None and not kinetics:
         still = Monomers(length=growth.monomers.length)
-        growth = replace(growth, monomers=still, plus_instability=None, minus_instability=None, severing=None)
+        growth = replace(
+            growth,
+            monomers=still,
+            plus_capped=False,
+            plus_instability=None,
+            minus_instability=None,
+            severing=None,
+        )
+    return growth
+
+
+def _add_reserve(filaments, group, kinetics, tables):
+    name, index = group.path
+    with tables[name][index].naming():
+        filaments.add_reserve(
+            group.type,
+            group.count,
+            growth=_growth(group, kinetics),
+            nucleation=group.nucleation if kinetics else None,
+            planar=group.planar,
+            propulsion=group.propulsion,
+        )
+
+
+def _add(filaments, group, nodes, control_points, kinetics):
     filaments.add_nodes(
         group.type,
         nodes,
@@ -210,7 +239,7 @@ def _add(filaments, group, nodes, control_points, kinetics):
         clamped_tangents=group.clamped_tangents,
         planar=group.planar,
         propulsion=group.propulsion,
-        growth=growth,
+        growth=_growth(group, kinetics),
     )
 
 
@@ -239,9 +268,9 @@ def _in_box(group, temperature, seed, number, places, box, planar):
         if planar is None or planar.crossing(number, nodes, group.closed) is None:
             return nodes, controls
     raise ConfigurationError(
-        f"[[filament]] number {group.table}: planar filament {number} crosses another one, or itself, at each of "
+        f"{group.label}: planar filament {number} crosses another one, or itself, at each of "
         f"{attempts} random places. Take fewer or shorter filaments, another height or a larger box.",
-        ("filament", group.table - 1, "planar"),
+        (*group.path, "planar"),
     )
 
 
@@ -269,9 +298,9 @@ def _inside(group, temperature, seed, number, places, planar):
     if crossed:
         reason = f"at all {crossed} of {attempts} random places inside it crosses another planar filament, or itself"
     raise ConfigurationError(
-        f"[[filament]] number {group.table}: filament {number} of {group.segments} segments does not fit into its "
+        f"{group.label}: filament {number} of {group.segments} segments does not fit into its "
         f"region: {reason}. Take shorter filaments or a larger region.",
-        ("filament", group.table - 1, "inside"),
+        (*group.path, "inside"),
     )
 
 
@@ -304,7 +333,11 @@ def _shape(group, temperature, seed, number, places, attempt=0):
 
 
 def _grid_centers(groups, temperature):
-    groups = [group for group in groups if group.position is None and group.inside is None and group.positions is None]
+    groups = [
+        group
+        for group in groups
+        if group.position is None and group.inside is None and group.positions is None and not group.is_reserve
+    ]
     count = sum(group.count for group in groups)
     spacing = 1.1 * max((_extent(group, temperature) for group in groups), default=0.0)
     columns = int(np.ceil(np.sqrt(count)))

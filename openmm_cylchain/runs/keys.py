@@ -36,6 +36,8 @@ _RANGES = {
     units.MASS_PER_LENGTH: (1e-9, 1e15),
     units.RATE: (1e-27, 1e6),
     units.ON_RATE: (1e-18, 1e3),
+    units.RATE_PER_LENGTH: (1e-30, 1e6),
+    units.RATE_PER_VOLUME: (1e-40, 1e6),
     units.VELOCITY: (1e-24, 1e6),
     units.VOLUME: (1e-18, 1e27),
     units.NUMBER_DENSITY: (1e-27, 1e6),

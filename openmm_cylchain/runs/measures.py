@@ -15,7 +15,7 @@ from ..output.colors import PLUS_END
 from ..output.run_files import RunFiles
 from ..output.run_tables import MILLISECOND
 from ..units.quantities import thermal_energy
-from .growth_summary import ENDS, GrowthTable
+from .growth_summary import ENDS, GrowthTable, rate_of_gains
 from .summary import group_members, is_in_equilibrium, mean_over_filaments
 from .tables.linkers import binds_to
 
@@ -132,7 +132,8 @@ def _shortest(run):
     lengths = [
         own.type.segment_lengths(own.segments, own.ring).sum() for own in run.filaments if not own.monomer_length
     ]
-    return float(min([*lengths, *(run.growth["length (nm)"][0] if run.growth else ())]))
+    grown = run.growth["length (nm)"][0] if run.growth else np.zeros(0)
+    return float(min([*lengths, *grown[grown > 0.0]], default=0.0))
 
 
 def _order(run, frame):
@@ -142,7 +143,7 @@ def _order(run, frame):
 
 def _bundled(run, frame, gap, overlap):
     bundles = analysis.find_bundles(run, frame, gap, _BUNDLE_ANGLE, overlap)
-    return sum(map(len, bundles)) / len(run.filaments)
+    return sum(map(len, bundles)) / max(1, _count(run, frame))
 
 
 def _joined(run, frame):
@@ -153,7 +154,12 @@ def _joined(run, frame):
     graph = scipy.sparse.coo_array((np.ones(len(pairs)), pairs.T), (count, count))
     _, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
     largest = int(np.bincount(label).max())
-    return largest / count if largest > 1 else 0.0
+    return largest / _count(run, frame) if largest > 1 else 0.0
+
+
+def _count(run, frame):
+    # Without places of filaments that are not there.
+    return len(run.filaments) - (int(np.sum(run.growth["nodes"][frame] == 0)) if run.growth else 0)
 
 
 def _radius(run, frame):
@@ -201,14 +207,15 @@ def _of_growth(configuration, run):
     if not growing:
         return
     table = GrowthTable(RunFiles(run.path))
-    lengths, late = table.column("length (nm)"), slice(len(table.times) // 2, None)
-    found = {"first": float(lengths[0].mean()), "last": float(lengths[-1].mean())}
-    if len(lengths[late]) > 1:
-        found["mean"], found["standard_error"] = mean_over_filaments(lengths[late])
-    yield GROWN, found
+    lengths, late, there = table.column("length (nm)"), slice(len(table.times) // 2, None), table.there()
+    if there.all():
+        found = {"first": float(lengths[0].mean()), "last": float(lengths[-1].mean())}
+        if len(lengths[late]) > 1:
+            found["mean"], found["standard_error"] = mean_over_filaments(lengths[late])
+        yield GROWN, found
     sizes = np.concatenate([np.full(group.count, group.growth.monomers.length) for group in growing])
     for end, name in GROWTH.items():
         if len(lengths[late]) > 2 and any(group.growth.states(end).grows for group in growing):
-            steps = np.diff(table.times[late])[:, None] / _SECOND
-            mean, error = mean_over_filaments(np.diff(table.ends(end)[late], axis=0) * sizes / steps)
-            yield name, {"mean": mean, "standard_error": error}
+            mean, error = rate_of_gains(table, end, late=late, sizes=sizes)
+            if np.isfinite(mean):
+                yield name, {"mean": mean, "standard_error": error}

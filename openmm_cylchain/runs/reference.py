@@ -4,7 +4,7 @@ python -m openmm_cylchain.runs.reference > docs/configuration.md
 """
 
 from .configuration import TABLES
-from .keys import REQUIRED, Choice
+from .keys import REQUIRED, Choice, Listing
 from .table import TableKind
 
 _INTRODUCTION = """# The file of a run
@@ -71,7 +71,9 @@ def _written(value):
 
 
 def _tables_in(key):
-    table = getattr(key.kind, "table", None)
+    # Of a list, the table that its items are.
+    kind = key.kind.kind if isinstance(key.kind, Listing) else key.kind
+    table = getattr(kind, "table", None)
     if isinstance(table, TableKind):
         yield key.name, table
 

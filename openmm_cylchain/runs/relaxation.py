@@ -68,7 +68,10 @@ def _bind_linkers(configuration, built, positions):
         )
         for number, own in enumerate(filaments)
     ]
-    linkers = [replace(own, bound=group.bound) for own, group in zip(filaments.linkers, configuration.linkers)]
+    # Behind those of the configuration are those of branches.
+    linkers = list(filaments.linkers)
+    for number, group in enumerate(configuration.linkers):
+        linkers[number] = replace(linkers[number], bound=group.bound)
     box = None if configuration.box is None else box_vectors(configuration.box)
     place_linkers(find_binding_force(built.system), linkers, moved, filaments.temperature, positions, box)
 

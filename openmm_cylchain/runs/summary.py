@@ -105,18 +105,22 @@ def group_members(configuration):
 
 def group_labels(configuration):
     """A short name for each [[filament]] table, distinct if there are several."""
-    labels = [
-        f"{group.count} × {group.type.name}, {group.segments} "
-        f"{group.type.segment_kind.name}{'s' * (group.segments > 1)}"
-        for group in configuration.filaments
-    ]
+    labels = [_label(group) for group in configuration.filaments]
     loads = loads_of_filaments(configuration)
     of_groups = [list(dict.fromkeys(loads[number] for number in own)) for own in group_members(configuration)]
     if len(set(labels)) < len(labels) and any(loads) and all(len(own) == 1 for own in of_groups):
         labels = [f"{label}, {load}" for label, (load,) in zip(labels, of_groups)]
     if len(set(labels)) < len(labels):
-        labels = [f"{label} (table {group.table})" for label, group in zip(labels, configuration.filaments)]
+        labels = [f"{label} (table {group.path[1] + 1})" for label, group in zip(labels, configuration.filaments)]
     return labels
+
+
+def _label(group):
+    if group.is_reserve:
+        what = {"filament": "parts of others", "nucleation": "that begin", "branching": "branches"}[group.path[0]]
+        return f"up to {group.count} × {group.type.name}, {what}"
+    segments = f"{group.segments} {group.type.segment_kind.name}{'s' * (group.segments > 1)}"
+    return f"{group.count} × {group.type.name}, {segments}"
 
 
 def is_in_equilibrium(group):

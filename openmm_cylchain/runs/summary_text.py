@@ -23,7 +23,7 @@ _EXPLANATIONS = {
 }
 
 
-def write_summary(configuration, directory, groups, linkers=(), measures=(), growth=()):
+def write_summary(configuration, directory, groups, linkers=(), measures=(), growth=(), population=None):
     """Write the summary as JSON into the directory of the run."""
     settings = configuration.simulation
     content = {
@@ -39,6 +39,7 @@ def write_summary(configuration, directory, groups, linkers=(), measures=(), gro
         **({"linkers": [asdict(own) for own in linkers]} if linkers else {}),
         **({"measures": [asdict(own) for own in measures]} if measures else {}),
         **({"growth": [asdict(own) for own in growth]} if growth else {}),
+        **({"population": asdict(population)} if population else {}),
     }
     write_atomically(directory.summary, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
 
@@ -49,7 +50,7 @@ def _rounded(value, digits):
     return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e9 else text
 
 
-def format_summary(configuration, groups, linkers=(), measures=(), growth=()):
+def format_summary(configuration, groups, linkers=(), measures=(), growth=(), population=None):
     """The summary as text for a terminal: what is compared with theory, averages of what is not, and measures."""
     settings = configuration.simulation
     lines = [
@@ -66,6 +67,8 @@ def format_summary(configuration, groups, linkers=(), measures=(), growth=()):
         ]
     if growth:
         lines += ["", *_growth_table(growth), *_waits(growth)]
+    if population:
+        lines += ["", *_population(population)]
     compared = [[own for own in group.observables if own.verdict != NOT_COMPARABLE] for group in groups]
     for group, own in zip(groups, compared):
         if len(own) > 1:
@@ -137,10 +140,37 @@ def _linker_table(linkers):
 def _growth_table(growth):
     rows = [("ends of filaments that grow", "monomers gained", "lost", "gained per second and end", "of free ends")]
     for own in growth:
-        rate = format_with_error(own.rate, own.rate_error)
+        rate = _with_error(own.rate, own.rate_error)
         name = f"{own.name}, {own.end} end{'s' * (not own.name.startswith('1 '))}"
-        rows.append((name, str(own.gained), str(own.lost), rate, _rounded(own.rate_of_free_ends, 3)))
+        free = "-" if own.rate_of_free_ends is None else _rounded(own.rate_of_free_ends, 3)
+        rows.append((name, str(own.gained), str(own.lost), rate, free))
     return _aligned(rows, (0,))
+
+
+def _with_error(value, error):
+    if value is None:
+        return "-"
+    return f"{value:.4g}" if error is None else format_with_error(value, error)
+
+
+def _population(population):
+    rows = [("filaments that come and go", "at once", "of free ones", "mean length (nm)", "of free ones")]
+    for own in population.kinds:
+        known = "-" if own.number_of_free_ones is None else _rounded(own.number_of_free_ones, 3)
+        length = _with_error(own.length, own.length_error)
+        free = "-" if own.length_of_free_ones is None else _rounded(own.length_of_free_ones, 3)
+        rows.append((own.name, format_with_error(own.number, own.number_error), known, length, free))
+    yield from _aligned(rows, (0,))
+    yield "  Means over the last half of the run."
+    counts = (("began", population.nucleated), ("vanished", population.vanished), ("were cut", population.severed))
+    yield f"  In all of it, {', '.join(f'{count} {what}' for what, count in counts)}."
+    if population.branches is not None:
+        yield f"  At the end, {population.branches} of them hold on to mothers as branches."
+    if population.without_place:
+        yield (
+            f"  {population.without_place} more would have begun or been cut, but there was no place for them: give "
+            "a larger count, or reserve, and run again."
+        )
 
 
 def _waits(growth):

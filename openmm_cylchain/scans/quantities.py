@@ -22,7 +22,8 @@ _OF_LINKERS = {
     "mean tension of linkers": ("mean_tension", "pN"),
     "largest tension of linkers": ("largest_tension", "pN"),
 }
-QUANTITIES = (*_OF_FILAMENTS, *_OF_LINKERS, *MEASURES)
+_OF_POPULATIONS = {"filaments at once": ("number", ""), "mean length of filaments that come and go": ("length", "nm")}
+QUANTITIES = (*_OF_FILAMENTS, *_OF_LINKERS, *MEASURES, *_OF_POPULATIONS)
 """Names of all quantities."""
 
 
@@ -48,6 +49,7 @@ def read_quantities(path):
             *_of_filaments(summary["groups"]),
             *_of_linkers(summary.get("linkers", [])),
             *_of_all(summary.get("measures", [])),
+            *_of_populations(summary.get("population", {"kinds": []})["kinds"]),
         ]
     except (ValueError, KeyError, TypeError):
         raise InputError(f"{path} is no summary of a run: remove it, and start the scan again.") from None
@@ -82,6 +84,14 @@ def _of_all(measures):
     for own in measures:
         value = own["last"] if own["mean"] is None else own["mean"]
         yield Quantity("all filaments", 0, own["name"], own["unit"], value, own["standard_error"], None)
+
+
+def _of_populations(kinds):
+    for number, own in enumerate(kinds):
+        for quantity, (field, unit) in _OF_POPULATIONS.items():
+            if own[field] is not None:
+                error, theory = own[f"{field}_error"], own[f"{field}_of_free_ones"]
+                yield Quantity(own["name"], number, quantity, unit, own[field], error, theory)
 
 
 def _distinct(names):

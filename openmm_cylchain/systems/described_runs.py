@@ -224,17 +224,18 @@ def energy_cells(
     """
     segments = sum(filament.segments for filament in filaments)
     bends = sum(filament.bends for filament in filaments)
+    there = np.ones(len(filaments), dtype=bool)
     if growth is not None:
-        added = sum(
-            int(nodes) - len(filaments[number].positions) for number, nodes in zip(growth.filaments, growth.nodes)
-        )
-        segments, bends = segments + added, bends + added
-    ends = np.array([(nodes[0], nodes[-1]) for nodes in filaments.node_indices])
+        grown = [filaments[number] for number in growth.filaments]
+        segments += int(np.maximum(growth.nodes - 1, 0).sum()) - sum(own.segments for own in grown)
+        bends += int(np.maximum(growth.nodes - 2, 0).sum()) - sum(own.bends for own in grown)
+        there[growth.filaments] = growth.nodes > 0
+    ends = np.array([(nodes[0], nodes[-1]) for nodes in filaments.node_indices])[there]
     return (
         stretching,
         bending,
         stretching + bending,
-        stretching / segments / kT if kT else np.nan,
+        stretching / segments / kT if segments and kT else np.nan,
         bending / bends / kT if bends and kT else np.nan,
-        float(np.mean(np.linalg.norm(positions[ends[:, 1]] - positions[ends[:, 0]], axis=1))),
+        float(np.mean(np.linalg.norm(positions[ends[:, 1]] - positions[ends[:, 0]], axis=1))) if len(ends) else np.nan,
     )

@@ -83,13 +83,16 @@ class TiedFilaments(AddedFilaments):
         Raises
         ------
         InputError
-            For a filament or node that does not exist, a filament that grows, a second tether, or a stiffness that is
-            not positive.
+            For a filament or node that does not exist, a node of a filament that grows but for the first one of a
+            capped minus end, a second tether, or a stiffness that is not positive.
         """
         label = f"Tether {len(self._tethers)}"
         self._refuse_if_built(label)
-        filament = self._lasting_filament(filament, label, "a tether")
+        filament = self._filament_number(filament, label)
         (node,) = named_nodes([node], len(self[filament].positions), f"{label}:")
+        growth = self[filament].growth
+        if growth is not None and not (node == 0 and not growth.states("minus").grows):
+            self._lasting_filament(filament, label, "a tether", "Its first node can, with minus_capped=True.")
         if (filament, node) in self._tethered_nodes:
             raise InputError(f"{label}: node {node} of filament {filament} has a tether already.")
         x, y, z = (float(x) for x in vector(point, LENGTH, f"{label}: point"))

@@ -28,6 +28,8 @@ VELOCITY = unit.nanometer / unit.picosecond
 RATE = unit.picosecond**-1
 ON_RATE = VOLUME * RATE
 """Of what comes, per number of free ones in a volume."""
+RATE_PER_LENGTH = RATE / LENGTH
+RATE_PER_VOLUME = RATE / VOLUME
 ENERGY = unit.kilojoule_per_mole
 FORCE = unit.kilojoule_per_mole / unit.nanometer
 STIFFNESS = unit.kilojoule_per_mole / unit.nanometer**2

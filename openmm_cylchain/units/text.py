@@ -21,6 +21,8 @@ from .quantities import (
     NUMBER_DENSITY,
     ON_RATE,
     RATE,
+    RATE_PER_LENGTH,
+    RATE_PER_VOLUME,
     ROTATIONAL_FRICTION,
     STIFFNESS,
     TEMPERATURE,
@@ -45,6 +47,8 @@ _EXAMPLES = {
     MASS_PER_LENGTH: ("mass per length", "3500 Da/nm"),
     RATE: ("rate", "10 1/s"),
     ON_RATE: ("rate per concentration", "11.6 1/(uM*s)"),
+    RATE_PER_LENGTH: ("rate per length", "0.01 1/(um*s)"),
+    RATE_PER_VOLUME: ("rate per volume", "0.1 1/(um^3*s)"),
     VELOCITY: ("velocity", "0.5 um/s"),
     VOLUME: ("volume", "1 um^3"),
     NUMBER_DENSITY: ("concentration", "1 uM"),
@@ -130,7 +134,7 @@ def _convert(number, written, target, name):
     try:
         quantity = registry.Quantity(number, unit)
         candidates = [quantity]
-        if "mol" in symbol or target is NUMBER_DENSITY:
+        if "mol" in symbol or target in (NUMBER_DENSITY, RATE_PER_VOLUME):
             candidates.append(quantity.to_base_units() * (AVOGADRO / registry.mole))
         elif "Da" in symbol or target is ON_RATE:
             candidates.append(quantity.to_base_units() * (registry.mole / AVOGADRO))

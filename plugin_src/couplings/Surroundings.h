@@ -8,8 +8,8 @@
 namespace cylchain {
 
 /**
- * How a chain would change at one of its ends. One that begins has one node and no segments before, and one that vanishes
- * so afterwards.
+ * How a chain would change at one of its ends. One that begins has one node and no segments before, and one that
+ * vanishes so afterwards.
  */
 struct EndChange {
     /** The number of the chain. */

@@ -97,8 +97,8 @@ struct PieceOfChain {
 };
 
 /**
- * What has become of packs of which chains have changed: they hold the same nodes as before, or other ones; or they have
- * become too many for what they hold, and a new engine is needed.
+ * What has become of packs of which chains have changed: they hold the same nodes as before, or other ones; or they
+ * have become too many for what they hold, and a new engine is needed.
  */
 enum class Replacement {SameNodes, OtherNodes, Impossible};
 
@@ -116,8 +116,8 @@ enum class Replacement {SameNodes, OtherNodes, Impossible};
 class ChainEngine {
 public:
     /**
-     * @param chains     the chains; no particle may be a node of two of them. A chain without models is refused, and one
-     *                   without nodes does nothing.
+     * @param chains     the chains; no particle may be a node of two of them. A chain without models is refused, and
+     *                   one without nodes does nothing.
      * @param mayChange  whether replaceChains() may be called: results then depend on what chains are, and not on the
      *                   packs in which they have come to be
      */

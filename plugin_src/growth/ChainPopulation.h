@@ -10,8 +10,8 @@ namespace cylchain {
 /**
  * Chains that begin, vanish and are cut.
  *
- * A nucleator begins chains at the rate J min(1, exp(-V/k_B T)), with V the energy of all that is around the new one: it
- * begins somewhere in the region of the nucleator, all places and directions being as likely, with the shape of
+ * A nucleator begins chains at the rate J min(1, exp(-V/k_B T)), with V the energy of all that is around the new one:
+ * it begins somewhere in the region of the nucleator, all places and directions being as likely, with the shape of
  * equilibrium. A chain with as few monomers as it can have vanishes at the rate k_off min(1, exp(V/k_B T)), k_off being
  * the sum of those of its ends. So chains that begin and vanish are in equilibrium with those that grow and shrink.
  * Chains that are cut are in none, but both parts keep the shape of it.

@@ -10,8 +10,8 @@ namespace cylchain {
 /**
  * Ends that gain and lose monomers, and change their states.
  *
- * Monomers come at the rate k_on c min(1, exp(-dV/k_B T)), and go at k_off min(1, exp(-dV/k_B T)), with dV the change of
- * the energies of all that is around. The shape of the chain is that of equilibrium before and after (ChainShapes).
+ * Monomers come at the rate k_on c min(1, exp(-dV/k_B T)), and go at k_off min(1, exp(-dV/k_B T)), with dV the change
+ * of the energies of all that is around. The shape of the chain is that of equilibrium before and after (ChainShapes).
  */
 class EndGrowth {
 public:

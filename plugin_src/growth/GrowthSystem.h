@@ -28,8 +28,8 @@ struct EndTiming {
     /** Whether they do so at regular times, and not at random. */
     bool isRegular = false;
     /**
-     * Of those that come, the energy E in kJ/mol of the share exp(-dV/E) that what is around leaves of their rate; k_B T
-     * if it is zero.
+     * Of those that come, the energy E in kJ/mol of the share exp(-dV/E) that what is around leaves of their rate;
+     * k_B T if it is zero.
      */
     double energyOfLoad = 0;
 };
@@ -88,7 +88,7 @@ enum class NucleationRegion : int {PeriodicBox, Cuboid, Sphere};
 
 /** How a chain begins as a branch of another one. */
 struct BranchPlace {
-    /** The angle between both, towards the plus ends, and the stiffness in kJ/mol of its energy K (theta-theta0)^2/2. */
+    /** The angle between both, towards the plus ends, and the stiffness K in kJ/mol of K (theta-theta0)^2/2. */
     double angle = 0, stiffness = 0;
     /** How far from the axis of the other one it begins, and how much of that must be there beyond the place. */
     double distance = 0, beyond = 0;
@@ -96,7 +96,7 @@ struct BranchPlace {
 
 /** Where and how often chains begin. */
 struct Nucleator {
-    /** The rate, in 1/ps, at the first concentration of the pool: in all of the region, or for each monomer of mothers. */
+    /** The rate, in 1/ps, at the first concentration of the pool: in all of the region, or for a monomer of mothers. */
     double rate = 0;
     /** Which power of the concentration it is proportional to. */
     int order = 0;
@@ -166,7 +166,7 @@ struct GrowthState {
     std::vector<std::deque<MonomerState> > monomers;
     /** The monomers that are free, of each pool that is closed. */
     std::vector<long long> free;
-    /** Which of all chains that have ever been each of them is, counted from zero, and of which it was a part, or -1. */
+    /** Which of all chains that have ever been each of them is, from zero on, and of which it was a part, or -1. */
     std::vector<long long> identities, parents;
     long long nextIdentity = 0;
     PopulationEvents population;

@@ -19,6 +19,13 @@ const int MOST_NEW_LINKERS = 10000000;
 /** The random numbers of when linkers come out of a concentration belong to this, less the number of the type. */
 const uint32_t NEW_LINKERS = 0xffffffff;
 
+/** Of a length along a chain. */
+const double ROUNDING = 1e-9;
+
+double endOf(const Contours& contours, int chain, int end) {
+    return contours.getBegin(chain)+(end == 1 ? contours.getLength(chain) : 0);
+}
+
 uint64_t drawNumber() {
     static atomic<uint64_t> last(0);
     return ++last;
@@ -72,6 +79,7 @@ void LinkerKinetics::sumLengths() {
 }
 
 bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& cuts, LinkerState& state) {
+    const Contours before = move(contours);
     contours = Contours(chains);
     sumLengths();
     cells.forgetSegments();
@@ -82,17 +90,22 @@ bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& 
     for (Linker& linker : state.linkers)
         for (int side = 0; side < 2; side++) {
             HandPlace& place = linker.hands[side];
-            const HandPlace before = place;
-            if (!before.isBound() || contours.isClosed(before.chain))
+            const HandPlace old = place;
+            if (!old.isBound() || contours.isClosed(old.chain))
                 continue;
+            const HandAtEnd& atEnd = system.hands[system.types[linker.type].hands[side]].atEnd;
+            const bool wasAtEnd = atEnd.tracks && fabs(place.position-endOf(before, place.chain, atEnd.end)) <=
+                    ROUNDING*(1+fabs(place.position));
             for (const ChainCut& cut : cuts)
                 if (place.chain == cut.chain && place.position > cut.along)
                     place.chain = cut.part;
-            if (contours.getLength(place.chain) > 0)
+            if (wasAtEnd && contours.getLength(place.chain) > 0)
+                place.position = endOf(contours, place.chain, atEnd.end);
+            else if (contours.getLength(place.chain) > 0)
                 stayOnChain(linker, side, count);
             else
                 unbind(linker, side, nullptr, count);
-            any = any || place.chain != before.chain || !linker.hands[side].isBound() || linker.hands[side].position != before.position;
+            any = any || place.chain != old.chain || place.position != old.position;
         }
     for (size_t type = 0; type < system.types.size(); type++)
         state.events[type].unbindings += count.events[type].unbindings;

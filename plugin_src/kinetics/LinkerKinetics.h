@@ -151,6 +151,7 @@ private:
     std::uint64_t siteOf(const Hand& hand, const HandPlace& place) const;
     bool hasSite(const Hand& hand, int chain, double site) const;
     bool toSite(const Hand& hand, HandPlace& place) const;
+    bool toEnd(const Hand& hand, HandPlace& place) const;
     void bind(Linker& linker, int side, const HandPlace& place, Sites* sites, Count& count) const;
     void unbind(Linker& linker, int side, Sites* sites, Count& count) const;
     LinkerSystem system;

@@ -181,7 +181,8 @@ void LinkerKinetics::stayOnChain(Linker& linker, int side, Count& count) const {
     const double begin = contours.getBegin(place.chain), end = begin+length;
     if (place.position >= begin && place.position <= end)
         return;
-    if (system.hands[system.types[linker.type].hands[side]].holdsAtEnds)
+    const Hand& hand = system.hands[system.types[linker.type].hands[side]];
+    if (hand.holdsAtEnds || (hand.atEnd.tracks && hand.atEnd.end == (place.position > end ? 1 : 0)))
         place.position = min(end, max(begin, place.position));
     else
         unbind(linker, side, nullptr, count);
@@ -205,6 +206,16 @@ bool LinkerKinetics::toSite(const Hand& hand, HandPlace& place) const {
     const double site = floor(place.position/hand.siteSpacing);
     place.position = (site+0.5)*hand.siteSpacing;
     return hasSite(hand, place.chain, site);
+}
+
+/** Bring a hand to the end of its chain; false if it is not near to it. */
+bool LinkerKinetics::toEnd(const Hand& hand, HandPlace& place) const {
+    const double begin = contours.getBegin(place.chain);
+    const double end = hand.atEnd.end == 1 ? begin+contours.getLength(place.chain) : begin;
+    if (fabs(place.position-end) > hand.atEnd.range)
+        return false;
+    place.position = end;
+    return true;
 }
 
 void LinkerKinetics::bind(Linker& linker, int side, const HandPlace& place, Sites* sites, Count& count) const {
@@ -263,6 +274,8 @@ bool LinkerKinetics::proposePlace(const Linker& linker, int side, const KineticS
         return false;
     if (hand.siteSpacing > 0 && (!toSite(hand, found) || sites->count(siteOf(hand, found)) > 0))
         return false;
+    if (hand.atEnd.bindsThere && !toEnd(hand, found))
+        return false;
     double from[3], vector[3];
     locate(placeOf(linker, 1-side), step.positions, step.boxes.segments, from);
     locate(contours.findPlace(found.chain, found.position), step.positions, step.boxes.segments, vector);
@@ -286,7 +299,9 @@ bool LinkerKinetics::captureAnywhere(const Linker& linker, int side, RandomNumbe
     found.chain = hand.chains[index];
     found.position = contours.getBegin(found.chain)+min(contours.getLength(found.chain),
             along-(index == 0 ? 0 : sum[index-1]));
-    return hand.siteSpacing == 0 || (toSite(hand, found) && sites->count(siteOf(hand, found)) == 0);
+    if (hand.siteSpacing > 0 && (!toSite(hand, found) || sites->count(siteOf(hand, found)) > 0))
+        return false;
+    return !hand.atEnd.bindsThere || toEnd(hand, found);
 }
 
 /** A hand on a site walks to the next one, if that is not taken. */

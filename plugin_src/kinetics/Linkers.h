@@ -8,6 +8,22 @@
 
 namespace cylchain {
 
+/** What a hand has to do with an end of chains that grow. */
+struct HandAtEnd {
+    /** The plus end (1) or the minus end (0), or -1 for none, and how near to it counts as there. */
+    int end = -1;
+    double range = 0;
+    /** Whether it binds there alone, and whether it stays there while the end grows. */
+    bool bindsThere = false, tracks = false;
+    /** The state that an end changes to while it is there, from another one; -1 if it changes none. */
+    int freeState = -1, heldState = -1;
+};
+
+/** An end at which a hand is that changes its state. */
+struct HeldEnd {
+    int chain, end, freeState, heldState;
+};
+
 /**
  * How a hand binds to filaments, walks along them and unbinds. Lengths along a filament are those of its segments at
  * rest.
@@ -38,6 +54,7 @@ struct Hand {
     bool holdsAtEnds = false;
     /** If positive, it binds to sites this far apart along filaments, which hold one hand each. */
     double siteSpacing = 0;
+    HandAtEnd atEnd;
     /** Whether the rate of unbinding depends on what the spring does. */
     bool isLoaded() const {
         return strainShare > 0 || unbindingForce > 0 || (catchRate > 0 && catchForce > 0);

@@ -121,7 +121,8 @@ static void raiseException(const std::exception& e) {
 %apply int& OUTPUT {int& bendingModel, int& stretchingModel, int& chain, int& node, int& particle, int& steps,
         int& particles, int& chain1, int& segment1, int& chain2, int& segment2, int& hand1, int& hand2,
         int& table, int& pool, int& firstMonomer, int& lastMonomer, int& leastMonomers, int& monomersPerSegment,
-        int& initialState, int& minusState, int& plusState, int& order, int& monomers, int& region, int& nucleator};
+        int& initialState, int& minusState, int& plusState, int& order, int& monomers, int& region, int& nucleator,
+        int& end, int& freeState, int& heldState};
 
 %typemap(in, numinputs=0) Vec3& point (OpenMM::Vec3 value) {
     $1 = &value;
@@ -234,8 +235,8 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         double& strainShare, double& unbindingForce, double& catchRate, double& catchForce, double& speed,
         double& stallForce, double& volume, double& concentration, double& elementLength, double& stretchingModulus,
         double& bendingRigidity, double& shortening, double& rate, double& angle,
-        double& distance, double& beyond};
-%apply bool& OUTPUT {bool& walksBackward, bool& holdsAtEnds, bool& sameChain, bool& vanishes, bool& isRegular};
+        double& distance, double& beyond, double& range};
+%apply bool& OUTPUT {bool& walksBackward, bool& holdsAtEnds, bool& sameChain, bool& vanishes, bool& isRegular, bool& bindsThere, bool& tracks};
 %apply long long& OUTPUT {long long& bindings, long long& unbindings};
 
 %pythoncode %{

@@ -40,11 +40,15 @@ def add_command(commands):
         "kinetics", help="motors and crosslinkers: a contractile bundle at several steps, most of an hour"
     )
     kinetics.set_defaults(command=_benchmark_kinetics)
+    turnover = benchmarks.add_parser(
+        "turnover", help="filaments that grow, begin, vanish and are cut, with linkers: 10 000 segments, some minutes"
+    )
+    turnover.set_defaults(command=_benchmark_turnover)
     platforms = benchmarks.add_parser(
         "platforms", help="filaments, alone and among particles, on each platform and in each precision, many minutes"
     )
     platforms.set_defaults(command=_benchmark_platforms)
-    for benchmark in (engines, scaling, time_step, bead_spring, base_pairs, networks, kinetics, platforms):
+    for benchmark in (engines, scaling, time_step, bead_spring, base_pairs, networks, kinetics, turnover, platforms):
         benchmark.add_argument("--quick", action="store_true", help="a rough measurement within a minute")
         benchmark.add_argument("--json", metavar="FILE", help="write machine, settings and results to FILE as well")
 
@@ -102,6 +106,12 @@ def _benchmark_kinetics(options):
     from .kinetics import FULL, QUICK, benchmark_kinetics
 
     _benchmark(options, lambda say: benchmark_kinetics(QUICK if options.quick else FULL, say=say))
+
+
+def _benchmark_turnover(options):
+    from .turnover import FULL, QUICK, benchmark_turnover
+
+    _benchmark(options, lambda say: benchmark_turnover(QUICK if options.quick else FULL, say=say))
 
 
 def _benchmark_platforms(options):

@@ -7,6 +7,8 @@
 
 #include "TestChains.h"
 #include "growth/ChainGrowth.h"
+#include <map>
+#include <tuple>
 
 static const int PER_SEGMENT = 12;
 static const double MONOMER = 2, KT = 2.5;
@@ -65,15 +67,23 @@ struct Weights {
         return length > 0 ? pow(length, planar ? 1 : 2)*exp(-stretchingByHand(segment, stretching, extension)/KT) : 0;
     }
     double meanBending(double stiffness) const {
+        static map<tuple<int, bool, double>, double> known;
+        double& found = known[{static_cast<int>(bending), planar, stiffness}];
+        if (found > 0)
+            return found;
         double sum = 0, norm = 0;
         for (int i = 0; i < 31415; i++) {
             const double angle = 1e-4*(i+0.5), weight = ofAngle(stiffness, angle);
             sum += weight*bendingByHand(bending, stiffness, angle);
             norm += weight;
         }
-        return sum/norm;
+        return found = sum/norm;
     }
     double meanStretching(const Segment& segment) const {
+        static map<tuple<int, bool, double, double>, double> known;
+        double& found = known[{static_cast<int>(stretching), planar, segment.restLength, segment.stiffness}];
+        if (found > 0)
+            return found;
         double sum = 0, norm = 0;
         for (int i = -10000; i < 10000; i++) {
             const double extension = 1e-4*i*segment.restLength, weight = ofExtension(segment, extension);
@@ -82,7 +92,7 @@ struct Weights {
                 norm += weight;
             }
         }
-        return sum/norm;
+        return found = sum/norm;
     }
 };
 

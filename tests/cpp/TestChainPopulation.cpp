@@ -101,7 +101,7 @@ static void testNucleation() {
         checkNucleation(stepSize);
 }
 
-/** What begins in a closed pool takes its monomers, and the law of mass action holds: J (n)_4/k for any other number. */
+/** What begins in a closed pool takes its monomers, and the law of mass action holds. */
 static void testPool() {
     // Nuclei of four monomers, which neither grow nor shrink but vanish.
     const double atFirst = 60, rate = 2, off = 1;
@@ -215,7 +215,8 @@ static void testContactsOfWhole() {
         EndContacts contacts(bodies, {0, -1, -1, -1, -1, 5}, 7, false);
         contacts.begin(x.data(), chains, NULL);
         const vector<Vec3d> start = {nodes[0]};
-        const EndChange begins = {5, 1, start, nodes, 0, 2, {}, {}, 1}, vanishes = {5, 1, nodes, start, 2, 0, {}, {}, 1};
+        const EndChange begins = {5, 1, start, nodes, 0, 2, {}, {}, 1};
+        const EndChange vanishes = {5, 1, nodes, start, 2, 0, {}, {}, 1};
         const double expected = energyOf(6)-energyOf(5);
         touching += expected > 0;
         checkClose(expected, contacts.findChange(begins), 1+expected, 1e-9, "the contacts of what begins");
@@ -257,7 +258,8 @@ static void testSeveringLengths() {
         GrowingEnd minus;
         minus.states = {{0, 0, 0, 0, {}}, {0, 1e6, 1, 1, {}}};
         for (int i = 0; i < 2*number; i++) {
-            all.add(WEIGHTS, i < number ? MonomerRange {0, 125} : MonomerRange {}, 100, minus, endOf(speed, 0), generator);
+            all.add(WEIGHTS, i < number ? MonomerRange {0, 125} : MonomerRange {}, 100, minus, endOf(speed, 0),
+                    generator);
             GrowingChain& own = all.system.chains[i];
             own.severing = {rate, {}, 1, 0};
             own.leastMonomers = least;
@@ -313,7 +315,7 @@ static void testSevering() {
         if (cut.chain < number)
             firstCuts[cut.chain]++;
     }
-    Mean bends, lengths, gaps;
+    Mean bends, lengths;
     Mean places;
     for (const ChainCut& cut : changes.cuts)
         places.add(cut.along/MONOMER);

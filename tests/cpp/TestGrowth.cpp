@@ -48,12 +48,6 @@ static void checkFreeEnds(const Weights& weights, double events) {
     for (int i = 0; i < steps; i++)
         all.advance(growth, time/steps, 7);
     Mean plus, minus, plusSquare, bends, lengths;
-    map<double, double> meanBending, meanStretching;
-    auto remember = [] (map<double, double>& known, double key, auto find) {
-        if (known.count(key) == 0)
-            known[key] = find();
-        return known[key];
-    };
     for (int i = 0; i < number; i++) {
         const MonomerRange& range = all.state.ranges[i];
         const double gained = range.last-24-i%7, lost = range.first+20+i%PER_SEGMENT;
@@ -68,12 +62,12 @@ static void checkFreeEnds(const Weights& weights, double events) {
             const double length = sqrt(along.squared());
             const Segment& segment = chain.segments[s];
             lengths.add(stretchingByHand(segment, weights.stretching, length-segment.restLength)/
-                    remember(meanStretching, segment.restLength, [&] {return weights.meanStretching(segment);}));
+                    weights.meanStretching(segment));
             if (s > 0) {
                 const double stiffness = chain.joints[s-1];
                 bends.add(bendingByHand(weights.bending, stiffness,
                         acos(max(-1.0, min(1.0, along.dot(before)/length))))/
-                        remember(meanBending, stiffness, [&] {return weights.meanBending(stiffness);}));
+                        weights.meanBending(stiffness));
             }
             before = along*(1/length);
             check(!weights.planar || along.z == 0, "a plane");
@@ -551,7 +545,6 @@ static void testRodInTheWay() {
 }
 
 int main() {
-    return runTests({testDivision, testFreeEnds, testRodBeforeWall, testPool, testDynamicInstability, testRegularTimes, testEnergyOfLoad, testOrder,
-            testContacts, testLinks,
-            testRodInTheWay});
+    return runTests({testDivision, testFreeEnds, testRodBeforeWall, testPool, testDynamicInstability, testRegularTimes,
+            testEnergyOfLoad, testOrder, testContacts, testLinks, testRodInTheWay});
 }

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from openmm import unit
 
-from openmm_cylchain import F_ACTIN, MICROTUBULE, Crosslinker, Filaments, Hand, InputError
+from openmm_cylchain import ACTIN_ATP, F_ACTIN, MICROTUBULE, Crosslinker, Filaments, Growth, Hand, InputError
 from support.contexts import new_context
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
@@ -26,7 +26,8 @@ def straight(kinds=(F_ACTIN,)):
 def begun(filaments, box=None):
     """The table and the springs of a Context in which nothing has happened yet."""
     _, system, positions = filaments.build(box_vectors=box)
-    context = new_context(system, positions)
+    integrator = filaments.create_integrator(system, 1.0, checks=False)
+    context = new_context(system, positions, integrator)
     here = filaments.in_context(context)
     return here.linkers(), here.linker_pulls()
 
@@ -110,3 +111,28 @@ def test_types_of_linkers_share_sites(anchored):
     more.add_linkers(replace(kind, name="motor"), 31, volume=1e9, bound=31)
     with pytest.raises(InputError, match="'motor': 31 are to begin bound, but there are only 30 sites"):
         more.build()
+
+
+def reserve(filaments):
+    """A hundred filaments that are not there yet."""
+    growth = Growth(monomers=ACTIN_ATP, pool=0.0, longest=1000.0)
+    filaments.add_reserve(F_ACTIN.with_segment_length(108.0), 100, growth=growth)
+    return filaments
+
+
+def test_no_linker_begins_on_filaments_that_are_not_there_yet():
+    filaments = reserve(straight())
+    points = np.tile([[200.0, ABOVE, 0.0]], (50, 1))
+    filaments.add_linkers(SPRING, 50, volume=1e6, bound=50)
+    filaments.add_linkers(SPRING, anchors=points, bound=50)
+    table, _ = begun(filaments)
+    assert table.counts(0) == (0, 50, 0) and table.counts(1) == (0, 0, 50)
+    assert set(table.filaments.ravel().tolist()) == {0, -1}
+
+
+@pytest.mark.parametrize("linkers", [{"count": 1, "volume": 1e6}, {"anchors": [[0.0, 0.0, 0.0]]}])
+def test_linkers_are_refused_that_begin_on_a_reserve_alone(linkers):
+    filaments = reserve(Filaments(VISCOSITY, TEMPERATURE, engine="compiled"))
+    filaments.add_linkers(SPRING, bound=1, **linkers)
+    with pytest.raises(InputError, match="none is there yet"):
+        begun(filaments)

@@ -206,6 +206,103 @@ checks = false
 """
 """Filaments that grow of monomers of two kinds, one of which becomes less, beside one that does not, with linkers."""
 
+COMING_AND_GOING = """
+title = "coming and going"
+[solvent]
+temperature = "298 K"
+viscosity = "10 mPa*s"
+[[monomers]]
+type = "ACTIN_AGING"
+concentration = "50 uM"
+volume = "4 um^3"
+[[monomers]]
+name = "rings"
+length = "8 nm"
+plus_on_rate = "5 1/(uM*s)"
+concentration = "20 uM"
+[[monomers]]
+name = "own"
+length = "2.7 nm"
+plus_on_rate = "5 1/(uM*s)"
+plus_off_rate = "400 1/s"
+aging = [{ name = "old", rate = "20 1/s", plus_off_rate = "800 1/s" }]
+concentration = "50 uM"
+[[filament]]
+type = "F_ACTIN"
+segment_length = "108 nm"
+segments = [6, 9]
+count = 6
+inside = { shape = "sphere", radius = "0.8 um" }
+reserve = 20
+[filament.growth]
+monomers = "ACTIN_AGING"
+longest = "1.2 um"
+minus_capped = true
+vanishes = true
+severing_rate = "20 1/(um*s)"
+severing_states = ["ADP", "ADP-Pi"]
+[[filament]]
+type = "MICROTUBULE"
+segment_length = "200 nm"
+segments = 2
+count = 2
+inside = { shape = "sphere", radius = "0.8 um" }
+[filament.growth]
+monomers = "rings"
+longest = "1 um"
+shortest = "100 nm"
+minus_capped = true
+vanishes = true
+hydrolysis_rate = "20 1/s"
+shrinking_off_rate = "200 1/s"
+[[nucleation]]
+table = 2
+count = 20
+rate = "50 1/(um^3*s)"
+inside = { shape = "box", lower = ["-0.5 um", "-0.5 um", "-0.5 um"], upper = ["0.5 um", "0.5 um", "0.5 um"] }
+length = "200 nm"
+direction = [1, 0, 0]
+[[nucleation]]
+name = "MINE"
+diameter = "7 nm"
+segment_length = "108 nm"
+persistence_length = "9 um"
+stretching_modulus = "20 nN"
+growth = { monomers = "own", longest = "1 um", vanishes = true }
+count = 10
+total_rate = "50 1/s"
+order = 2
+inside = { shape = "sphere", radius = "0.5 um" }
+[[branching]]
+table = 1
+count = 10
+rate = "20 1/(um*s)"
+mothers = [1]
+debranching_rate = "2 1/s"
+debranching_force = "50 pN"
+[[linkers]]
+type = "ALPHA_ACTININ"
+hand = { reach = "60 nm", binds_to = "ACT" }
+count = 20
+volume = "4 um^3"
+[[wall]]
+shape = "sphere"
+radius = "1 um"
+stiffness = "0.1 pN/nm"
+[contacts]
+diameter = "7 nm"
+[simulation]
+time_step = "0.1 ms"
+duration = "100 ms"
+report_interval = "5 ms"
+checkpoint_interval = "15 ms"
+seed = 2
+platform = "CPU"
+threads = 1
+checks = false
+"""
+"""Filaments that begin, vanish, are cut and branch, of monomers that age and with caps; it takes two seconds."""
+
 
 def placed_filaments(configuration):
     """Filaments with their initial positions, and linkers, that a run of a configuration has."""

@@ -9,15 +9,18 @@ from ...errors import InputError
 from ...filaments.chain_type import ChainType
 from ...filaments.growth import Growth, check_growth
 from ...filaments.shapes import MINIMUM_RING
+from ...kinetics.nucleation import Nucleation
 from ...units import quantities as units
 from ..keys import Choice, Either, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
 from ..start_files import read_start
 from ..table import TableKind
 from .filament_types import MONOMER_LENGTHS, TYPE_KEYS, read_filament_type
-from .monomers import GROWTH, GROWTH_EXAMPLE, read_growth
+from .monomers import GROWTH, GROWTH_EXAMPLE, SEVERING_EXAMPLE, read_growth
 from .shapes import REGION, REGION_EXAMPLE, Region
 
 STARTS = ("equilibrium", "straight")
+RESERVE = "reserve"
+"""How filaments start that are not there yet."""
 MOST_NODES = 10**7
 """Of a configuration: more than that would not fit into the memory of a computer of today."""
 
@@ -122,6 +125,12 @@ FILAMENT = TableKind(
             None,
             "Filaments gain and lose monomers of a [[monomers]] table at their ends: see below.",
         ),
+        Key(
+            "reserve",
+            Whole(1, MOST_NODES, "100"),
+            None,
+            "How many places there are for parts of filaments that are cut, with growth = { severing_rate = ... }.",
+        ),
         Key("file", Text('"start.npz"'), None, "Start from a file: see below."),
         Key("topology", Text('"topology.cif"'), None, "Topology of a file that is a trajectory."),
         Key("frame", Whole(-(10**12), 10**12, "-1"), None, "Which frame of a trajectory; the last one if not given."),
@@ -133,20 +142,20 @@ FILAMENT = TableKind(
         ),
         *TYPE_KEYS,
     ),
-    "Filaments of one kind.",
+    "Filaments of one kind. There is one such table at least, or a `[[nucleation]]`.",
     repeated=True,
-    required=True,
 )
 
 
 @dataclass(frozen=True)
 class FilamentGroup:
-    """Filaments of one [[filament]] table that have as many segments; lengths in nm.
+    """Filaments of one [[filament]] table that have as many segments, or that are not there yet; lengths in nm.
 
-    ``table`` is the number of the table, from 1; ``disturbed`` what makes them no free chains, in words: links, walls
-    and so on; ``tension`` that of their ends in kJ/(mol nm), with its direction, if nothing else is. ``positions`` are
-    those of a file, or given ones, for each filament, and ``control_points`` those of beam elements or None.
-    Those that grow have ``spare_nodes`` each.
+    ``table`` is the number of the table, from 1, or of that whose type and growth they share, and zero without one;
+    ``own_path`` that of the table that reserves places, if it is not that one, and ``nucleation`` how filaments begin.
+    ``disturbed`` is what makes them no free chains, in words: links, walls and so on; ``tension`` that of their ends in
+    kJ/(mol nm), with its direction, if nothing else is. ``positions`` are those of a file, or given ones, for each
+    filament, and ``control_points`` those of beam elements or None. Those that grow have ``spare_nodes`` each.
     """
 
     type: ChainType
@@ -171,6 +180,24 @@ class FilamentGroup:
     clamped_tangents: tuple = ()
     growth: Growth | None = dataclasses.field(default=None, compare=False)
     spare_nodes: int = 0
+    own_path: tuple = ()
+    nucleation: Nucleation | None = dataclasses.field(default=None, compare=False)
+
+    @property
+    def path(self):
+        """Of its table: ("filament", 0) is the first one."""
+        return self.own_path or ("filament", self.table - 1)
+
+    @property
+    def label(self):
+        """What messages call its table."""
+        name, index = self.path
+        return f"[[{name}]] number {index + 1}"
+
+    @property
+    def is_reserve(self):
+        """Whether its filaments are not there at first."""
+        return self.start == RESERVE
 
     @property
     def nodes(self):
@@ -202,6 +229,8 @@ def read_filaments(entries, table, solvent, box, folder, monomers):
     growth = None if entries["growth"] is None else read_growth(entries["growth"], monomers)
     own = {"planar": True} if entries["planar"] else {}
     common = {"propulsion": entries["propulsion"], "height": entries["height"], "table": table}
+    if growth is None:
+        entries.refuse(("reserve",), f"belongs to filaments that are cut: add growth = {SEVERING_EXAMPLE}")
     finished = []
     for group in groups:
         with entries.naming():
@@ -209,26 +238,46 @@ def read_filaments(entries, table, solvent, box, folder, monomers):
             given = entries["clamped"], entries["clamped_tangents"]
             clamped, tangents = kind.segment_kind.clamps(*given, group.nodes, label)
             kind.segment_friction(solvent.viscosity, solvent.temperature, group.segments)
-        spare = 0 if growth is None else _spare_nodes(entries, growth, group, clamped)
+        spare = 0
+        if growth is not None:
+            spare = _spare_nodes(entries, growth, kind, group.segments, group.closed, clamped)
         held = {"clamped": clamped, "clamped_tangents": tangents}
         finished.append(dataclasses.replace(group, **held, growth=growth, spare_nodes=spare, **own, **common))
     return finished
 
 
-def _spare_nodes(entries, growth, group, clamped):
+def reserve_group(entries, kind, growth, count, **others):
+    """The FilamentGroup of a table for filaments of a type that are not there yet: a count of places."""
+    nodes = _spare_nodes(entries, growth, kind)
+    return FilamentGroup(
+        kind, 1, count, RESERVE, None, None, (), growth=growth, spare_nodes=max(0, nodes - 2), **others
+    )
+
+
+def read_reserve(entries, groups):
+    """The FilamentGroup of a [[filament]] table that reserves places, of its other groups; None if it has none."""
+    if entries["reserve"] is None:
+        return None
+    first = groups[0]
+    own = {"planar": first.planar, "propulsion": first.propulsion, "height": first.height, "table": first.table}
+    return reserve_group(entries, first.type, first.growth, entries["reserve"], **own)
+
+
+def _spare_nodes(entries, growth, kind, segments=None, closed=False, clamped=()):
+    # All nodes of one that has no segments yet.
     label = entries.label.rstrip(":")
-    if group.type.segment_kind.straight:
+    if kind.segment_kind.straight:
         try:
-            growth.monomers_per_segment(group.type)
+            growth.monomers_per_segment(kind)
         except InputError:
             length = growth.monomers.length
-            near = max(2, round(group.type.segment_length / length)) * length
+            near = max(2, round(kind.segment_length / length)) * length
             raise entries.error(
-                f"grows by {length:g} nm with a monomer, and its segments are {group.type.segment_length:g} nm long: "
+                f"grows by {length:g} nm with a monomer, and its segments are {kind.segment_length:g} nm long: "
                 f'they must be a whole number of monomers, as with segment_length = "{near:.12g} nm"'
             ) from None
     with entries.naming():
-        return check_growth(growth, group.type, group.segments, group.closed, clamped, label)
+        return check_growth(growth, kind, segments, closed, clamped, label)
 
 
 def _check_element(entries, kind):

@@ -4,22 +4,43 @@ import dataclasses
 from dataclasses import dataclass
 
 from ...engine_choice import choose_engine
-from ...filaments.growth import DynamicInstability, Growth, MonomerPool, Monomers
-from ...filaments.presets import ACTIN_ATP, TUBULIN
+from ...filaments.end_states import DynamicInstability, TwoUnitCap
+from ...filaments.growth import Growth, MonomerPool, Monomers, MonomerState, Severing
+from ...filaments.presets import ACTIN_AGING, ACTIN_ATP, TUBULIN
 from ...time_steps.schemes import IMPLICIT_SCHEMES
 from ...units import quantities as units
-from ..keys import REQUIRED, Choice, Flag, Key, Quantity, Text, WordOrQuantity
+from ..keys import REQUIRED, Choice, Flag, Inline, Key, Listing, Quantity, Text, WordOrQuantity
 from ..table import TableKind
 from .couplings import group_of
 from .shapes import volume_within
 from .solvent import EDGES
 
-PRESETS = {"ACTIN_ATP": ACTIN_ATP, "TUBULIN": TUBULIN}
+PRESETS = {"ACTIN_ATP": ACTIN_ATP, "ACTIN_AGING": ACTIN_AGING, "TUBULIN": TUBULIN}
 """Monomers by the names that a configuration uses."""
 
 _RATES = ("plus_on_rate", "plus_off_rate", "minus_on_rate", "minus_off_rate")
 _INSTABILITY = ("catastrophe_rate", "rescue_rate", "shrinking_off_rate")
+_CAP = ("hydrolysis_rate", "rescue_rate", "shrinking_off_rate")
+_OF_GROWTH = ("longest", "shortest", "plus_capped", "minus_capped", "deterministic", "growing_force", "vanishes")
 GROWTH_EXAMPLE = '{ longest = "5 um" }'
+SEVERING_EXAMPLE = '{ longest = "5 um", severing_rate = "0.01 1/(um*s)" }'
+
+_AGE_EXAMPLE = '{ name = "ADP", rate = "0.003 1/s", plus_off_rate = "5.4 1/s" }'
+_AGE = TableKind(
+    "aging",
+    (
+        Key("name", Text('"ADP"'), REQUIRED, "What the state is called."),
+        Key("rate", Quantity(units.RATE, "zero"), REQUIRED, "At which monomers come to it from the state before."),
+        Key(
+            "plus_off_rate", Quantity(units.RATE, "zero"), None, "k_off of such a monomer at the end at the last node."
+        ),
+        Key("minus_off_rate", Quantity(units.RATE, "zero"), None, "k_off of one at the first node."),
+        Key("plus_on_rate", Quantity(units.ON_RATE, "zero"), None, "k_on there; that of new monomers if not given."),
+        Key("minus_on_rate", Quantity(units.ON_RATE, "zero"), None, "k_on at the first node, likewise."),
+    ),
+    "A state that monomers come to after some time, see `MonomerState`.",
+    owner="aging of [[monomers]]",
+)
 
 MONOMERS = TableKind(
     "monomers",
@@ -36,6 +57,12 @@ MONOMERS = TableKind(
         Key("plus_off_rate", Quantity(units.RATE, "zero"), None, "k_off of that end: it loses so many."),
         Key("minus_on_rate", Quantity(units.ON_RATE, "zero"), None, "k_on of the end at the first node."),
         Key("minus_off_rate", Quantity(units.RATE, "zero"), None, "k_off of that end."),
+        Key(
+            "aging",
+            Listing(Inline(_AGE, _AGE_EXAMPLE), "tables", f"[{_AGE_EXAMPLE}]", 0),
+            None,
+            "States to which monomers come one after the other. The rates above are those of new ones.",
+        ),
         Key(
             "concentration",
             Quantity(units.NUMBER_DENSITY, "zero"),
@@ -69,8 +96,52 @@ GROWTH = TableKind(
             None,
             "At which the plus end begins to shrink, if it grows and shrinks in turn: see `DynamicInstability`.",
         ),
-        Key("rescue_rate", Quantity(units.RATE, "zero"), None, "At which it begins to grow again."),
+        Key(
+            "hydrolysis_rate",
+            Quantity(units.RATE, "zero"),
+            None,
+            "In place of it, of an end with a cap of two monomers, which shrinks when both have hydrolysed: at which "
+            "each of them does. See `TwoUnitCap`.",
+        ),
+        Key(
+            "rescue_rate",
+            Quantity(units.RATE, "zero"),
+            None,
+            "At which it begins to grow again; with hydrolysis_rate zero if not given.",
+        ),
         Key("shrinking_off_rate", Quantity(units.RATE, "zero"), None, "How many monomers it loses while it shrinks."),
+        Key(
+            "deterministic",
+            Flag(),
+            False,
+            "Whether monomers come and go at regular times, so that filaments grow at a constant speed.",
+        ),
+        Key(
+            "growing_force",
+            Quantity(units.FORCE),
+            None,
+            "F_g of the rate k_on c exp(-F/F_g) under the load F; kT over the length of a monomer, which has an "
+            "equilibrium, if not given.",
+        ),
+        Key("vanishes", Flag(), False, "Whether a filament of the shortest length vanishes with its next monomer."),
+        Key(
+            "severing_rate",
+            Quantity(units.RATE_PER_LENGTH, "zero"),
+            None,
+            "How often it is cut in a length, at random: see `Severing`. Parts need places: reserve of [[filament]].",
+        ),
+        Key(
+            "severing_states",
+            Listing(Text('"ADP"'), "names of states", '["ADP"]'),
+            None,
+            "Of monomers that age: before which of them it is cut, any if not given; the first one is called new.",
+        ),
+        Key(
+            "severed_ends_shrink",
+            Flag(),
+            False,
+            "Whether plus ends that cuts make shrink, where these grow and shrink in turn.",
+        ),
     ),
     "How filaments grow and shrink at their ends, see `Growth`.",
 )
@@ -95,6 +166,8 @@ def read_monomers(entries, box, walls):
             f"and {', '.join(_RATES)}."
         )
     properties = entries.given("length", *_RATES)
+    if "aging" in entries:
+        properties["aging"] = [_age(own) for own in entries["aging"]]
     if preset is None:
         entries.require("length")
     if preset is None and not any(properties.get(rate) for rate in _RATES):
@@ -110,6 +183,11 @@ def read_monomers(entries, box, walls):
     with entries.naming():
         monomers = Monomers(**properties) if preset is None else dataclasses.replace(preset, **properties)
         return MonomerGroup(name, monomers, MonomerPool(entries["concentration"], volume))
+
+
+def _age(entries):
+    with entries.naming():
+        return MonomerState(**entries.given(*_AGE.names))
 
 
 def check_names(tables, groups):
@@ -133,17 +211,34 @@ def read_growth(entries, monomers):
     if len(found) > 1:
         names = ", ".join(own.name for own in monomers)
         raise entries.error(f"lacks the key 'monomers': there are {names}.")
-    turning = entries.given(*_INSTABILITY)
-    missing = [name for name in _INSTABILITY if name not in turning]
-    if turning and missing:
-        raise entries.error(f"lacks the key {missing[0]!r}: an end that grows and shrinks in turn has all three rates.")
     with entries.naming():
         return Growth(
             monomers=found[0].monomers,
             pool=found[0].pool,
-            plus_instability=DynamicInstability(**turning) if turning else None,
-            **{name: entries[name] for name in ("longest", "shortest", "plus_capped", "minus_capped")},
+            plus_instability=_instability(entries),
+            severing=_severing(entries),
+            **{name: entries[name] for name in _OF_GROWTH},
         )
+
+
+def _instability(entries):
+    if "hydrolysis_rate" in entries:
+        entries.refuse(("catastrophe_rate",), "cannot be with hydrolysis_rate, which says when an end shrinks.")
+        entries.require("shrinking_off_rate")
+        return TwoUnitCap(**entries.given(*_CAP))
+    turning = entries.given(*_INSTABILITY)
+    missing = [name for name in _INSTABILITY if name not in turning]
+    if turning and missing:
+        raise entries.error(f"lacks the key {missing[0]!r}: an end that grows and shrinks in turn has all three rates.")
+    return DynamicInstability(**turning) if turning else None
+
+
+def _severing(entries):
+    if "severing_rate" not in entries:
+        entries.refuse(("severing_states", "severed_ends_shrink"), "belongs to severing_rate.")
+        return None
+    states, shrinks = entries["severing_states"] or (), entries["severed_ends_shrink"]
+    return Severing(rate=entries["severing_rate"], of_states=states, shrinks=shrinks)
 
 
 def check_with_others(tables, configuration, settings):
@@ -184,6 +279,6 @@ def _refuse_growth(entries, number, groups, what):
     group = group_of(number, groups)
     if group.growth is not None:
         raise entries.error(
-            f"means filament {number}, which grows ([[filament]] number {group.table}): {what} filaments that grow "
+            f"means filament {number}, which grows ({group.label}): {what} filaments that grow "
             "yet. Leave its growth out, or take another filament."
         )

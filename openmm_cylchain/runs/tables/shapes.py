@@ -78,6 +78,11 @@ class Region:
     __hash__ = None
 
     @property
+    def shape(self):
+        """The Shape that it is within."""
+        return self._shape
+
+    @property
     def volume(self):
         """In nm^3."""
         if isinstance(self._shape, Cylinder):

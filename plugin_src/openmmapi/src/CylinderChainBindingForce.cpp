@@ -259,6 +259,27 @@ void CylinderChainBindingForce::setLinkers(const vector<int>& numbers, const vec
     state.nextNumber = nextNumber;
 }
 
+void CylinderChainBindingForce::setHandAtEnd(int hand, int end, double range, bool bindsThere, bool tracks,
+        int freeState, int heldState) {
+    const bool changes = freeState >= 0 && heldState >= 0;
+    if (end < -1 || end > 1 || !(range >= 0 && range < HUGE_VAL) || (end == -1 && (bindsThere || tracks || changes)) ||
+            (freeState >= 0) != (heldState >= 0) || (changes && freeState == heldState))
+        throw OpenMMException("CylinderChainBindingForce: A kind of hands needs an end, a range that is not negative, "
+                "and two different states of ends or none");
+    handOf(hand).atEnd = {end, range, bindsThere, tracks, freeState, heldState};
+}
+
+void CylinderChainBindingForce::getHandAtEnd(int hand, int& end, double& range, bool& bindsThere, bool& tracks,
+        int& freeState, int& heldState) const {
+    const cylchain::HandAtEnd& own = getHand(hand).atEnd;
+    end = own.end;
+    range = own.range;
+    bindsThere = own.bindsThere;
+    tracks = own.tracks;
+    freeState = own.freeState;
+    heldState = own.heldState;
+}
+
 int CylinderChainBindingForce::addBranchJoint(int nucleator, const vector<int>& types,
         const vector<double>& parameters, const vector<double>& places) {
     if (nucleator < 0 || types.empty() || parameters.size() != types.size() || places.size() != types.size())

@@ -244,6 +244,25 @@ void CylinderChainBindingForceImpl::chainsHaveGrown(ContextImpl&, const cylchain
         accept();
 }
 
+void CylinderChainBindingForceImpl::findChangesOfEnds(vector<cylchain::HeldEnd>& ends) const {
+    for (const cylchain::Hand& hand : system.hands)
+        if (hand.atEnd.heldState >= 0)
+            ends.push_back({-1, hand.atEnd.end, hand.atEnd.freeState, hand.atEnd.heldState});
+}
+
+void CylinderChainBindingForceImpl::findHeldEnds(vector<cylchain::HeldEnd>& ends) {
+    for (const cylchain::Linker& linker : getState().linkers)
+        for (int side = 0; side < 2; side++) {
+            const cylchain::HandPlace& place = linker.hands[side];
+            if (!place.isBound())
+                continue;
+            const cylchain::HandAtEnd& own = system.hands[system.types[linker.type].hands[side]].atEnd;
+            const double end = contours->getBegin(place.chain)+(own.end == 1 ? contours->getLength(place.chain) : 0);
+            if (own.heldState >= 0 && fabs(place.position-end) <= own.range)
+                ends.push_back({place.chain, own.end, own.freeState, own.heldState});
+        }
+}
+
 /** Hold chains that have begun as branches. */
 bool CylinderChainBindingForceImpl::addBranches(const vector<cylchain::ChainBranch>& branches) {
     bool any = false;

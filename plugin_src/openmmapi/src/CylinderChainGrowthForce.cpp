@@ -160,7 +160,7 @@ void CylinderChainGrowthForce::setEndStates(int index, int end, int initialState
         requireOfGrowth(rates[i] == 0, "No state can change to itself");
         own.states.push_back({parameters[2*i], parameters[2*i+1], numbers[2*i], numbers[2*i+1], rates});
     }
-    chain.ends[end] = own;
+    chain.ends[end] = move(own);
 }
 
 void CylinderChainGrowthForce::getEndStates(int index, int end, int& initialState, vector<double>& parameters,
@@ -265,7 +265,7 @@ void CylinderChainGrowthForce::setBranching(int index, double angle, double stif
     ASSERT_VALID_INDEX(index, system.nucleators);
     requireOfGrowth(angle >= 0 && angle <= M_PI, "The angle of branches must be from 0 to pi");
     for (double value : {stiffness, distance, beyond})
-        requireOfGrowth(isRate(value), "The stiffness and the lengths of branches cannot be negative and must be finite");
+        requireOfGrowth(isRate(value), "The stiffness and lengths of branches cannot be negative and must be finite");
     for (int number : numbers)
         getOwn(number);
     system.nucleators[index].mothers = numbers;
@@ -332,9 +332,11 @@ void CylinderChainGrowthForce::setMonomers(ChainList& chains, set<int>& growing)
                 requireOfGrowth(SegmentDivision({0, nucleator.monomers}, table.monomersPerSegment).countSegments() <
                         chain.numNodes(), name+" cannot begin with "+to_string(nucleator.monomers)+" monomers: it has "+
                         to_string(chain.numNodes())+" particles");
-        for (int state : {own.severing.minusState, own.severing.plusState})
-            requireOfGrowth(state >= 0 && state < static_cast<int>(min(own.ends[0].states.size(),
-                    own.ends[1].states.size())), name+" has no end state "+to_string(state));
+        for (int end : {0, 1}) {
+            const int cut = end == 0 ? own.severing.minusState : own.severing.plusState;
+            requireOfGrowth(cut >= 0 && cut < static_cast<int>(own.ends[end].states.size()), name+" has no state "+
+                    to_string(cut)+" of ends at which it is cut");
+        }
         requireOfGrowth(!own.monomersHaveStates || (own.ends[0].states.size() == own.ends[1].states.size() &&
                 (own.severing.shares.empty() || own.severing.shares.size() == own.ends[1].states.size())),
                 name+" needs as many states of its minus end, and shares of its severing, as of its plus end");

@@ -37,7 +37,8 @@ static double digestOf(const GrowthState& state) {
 }
 
 CylinderChainGrowthForceImpl::CylinderChainGrowthForceImpl(const CylinderChainGrowthForce& owner) :
-        StepForceImpl(owner), owner(owner), context(NULL), chains(NULL), seed(0), hasCouplings(false), hasOtherForces(false) {
+        StepForceImpl(owner), owner(owner), context(NULL), chains(NULL), seed(0), hasCouplings(false),
+        hasOtherForces(false) {
 }
 
 void CylinderChainGrowthForceImpl::initialize(ContextImpl& context) {
@@ -165,10 +166,46 @@ void CylinderChainGrowthForceImpl::refusePlaces() {
     }
 }
 
+/** Let ends be in the states to which what is bound there changes them, and back in others when it is not. */
+void CylinderChainGrowthForceImpl::changeEnds() {
+    vector<HeldEnd> changes, held;
+    for (CouplingForceImpl* coupling : couplings) {
+        coupling->findChangesOfEnds(changes);
+        coupling->findHeldEnds(held);
+    }
+    if (changes.empty())
+        return;
+    const int count = growing.size();
+    vector<int> indexOf(chains->getDescription().getList().size(), -1);
+    for (int i = 0; i < count; i++)
+        indexOf[growing[i]] = i;
+    auto isOne = [&] (int i, const HeldEnd& change) {
+        const int states = owner.getSystem().chains[i].ends[change.end].states.size();
+        return change.freeState < states && change.heldState < states;
+    };
+    vector<char> isHeld(2*count, 0);
+    for (const HeldEnd& own : held) {
+        const int i = indexOf[own.chain];
+        if (i < 0 || !isOne(i, own))
+            continue;
+        int& now = state.endStates[2*i+own.end];
+        if (now == own.freeState)
+            now = own.heldState;
+        if (now == own.heldState)
+            isHeld[2*i+own.end] = 1;
+    }
+    for (const HeldEnd& change : changes)
+        for (int i = 0; i < count; i++)
+            if (isOne(i, change) && isHeld[2*i+change.end] == 0 && state.endStates[2*i+change.end] == change.heldState)
+                state.endStates[2*i+change.end] = change.freeState;
+    accept();
+}
+
 void CylinderChainGrowthForceImpl::updateContextState(ContextImpl& context, bool& forcesInvalid) {
     follow();
     findCouplings();
     refusePlaces();
+    changeEnds();
     const double size = context.getIntegrator().getStepSize();
     if (!(size > 0))
         return;
@@ -252,7 +289,8 @@ void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
     const GrowthSystem& system = owner.getSystem();
     const size_t count = growing.size();
     requireOfGrowing(replaced.ranges.size() == count && replaced.events.size() == 2*count &&
-            replaced.endStates.size() == 2*count && replaced.phases.size() == 2*count && replaced.monomers.size() == count &&
+            replaced.endStates.size() == 2*count && replaced.phases.size() == 2*count &&
+            replaced.monomers.size() == count &&
             replaced.identities.size() == count && replaced.parents.size() == count &&
             replaced.free.size() == system.pools.size(), "A State or checkpoint has the growth of another number of "
             "chains or pools");

@@ -21,6 +21,10 @@ static void write(const CylinderChainBindingForce& force, SerializationNode& nod
                 .setDoubleProperty("speed", hand.speed).setDoubleProperty("stallForce", hand.stallForce)
                 .setBoolProperty("walksBackward", hand.walksBackward)
                 .setBoolProperty("holdsAtEnds", hand.holdsAtEnds).setDoubleProperty("siteSpacing", hand.siteSpacing);
+        const cylchain::HandAtEnd& atEnd = hand.atEnd;
+        child.setIntProperty("end", atEnd.end).setDoubleProperty("endRange", atEnd.range)
+                .setBoolProperty("bindsAtEnd", atEnd.bindsThere).setBoolProperty("tracksEnd", atEnd.tracks)
+                .setIntProperty("freeState", atEnd.freeState).setIntProperty("heldState", atEnd.heldState);
         for (int chain : hand.chains)
             child.createChildNode("Chain").setIntProperty("index", chain);
     }
@@ -68,6 +72,9 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
                 hand.getDoubleProperty("catchForce"));
         force->setHandWalking(number, hand.getDoubleProperty("speed"), hand.getDoubleProperty("stallForce"),
                 hand.getBoolProperty("walksBackward"), hand.getBoolProperty("holdsAtEnds"));
+        force->setHandAtEnd(number, hand.getIntProperty("end"), hand.getDoubleProperty("endRange"),
+                hand.getBoolProperty("bindsAtEnd"), hand.getBoolProperty("tracksEnd"),
+                hand.getIntProperty("freeState"), hand.getIntProperty("heldState"));
         force->setHandSiteSpacing(number, hand.getDoubleProperty("siteSpacing"));
     }
     for (auto& type : node.getChildNode("LinkerTypes").getChildren()) {

@@ -138,6 +138,23 @@ public:
      */
     void setHandWalking(int hand, double speed, double stallForce, bool walksBackward, bool holdsAtEnds);
     /**
+     * Set what a kind of hands has to do with an end of chains that grow.
+     *
+     * @param hand        the index of the kind
+     * @param end         the plus end (1) or the minus end (0), or -1 for none
+     * @param range       how near to the end counts as there, measured in nm
+     * @param bindsThere  whether it binds there alone, and comes to the end itself then
+     * @param tracks      whether one that is at the end stays there while the end grows and shrinks
+     * @param freeState   the state of ends that it changes, see CylinderChainGrowthForce::setEndStates(), or -1
+     * @param heldState   the state that these have while it is there, or -1
+     */
+    void setHandAtEnd(int hand, int end, double range, bool bindsThere, bool tracks, int freeState, int heldState);
+    /**
+     * Get what a kind of hands has to do with an end, see setHandAtEnd().
+     */
+    void getHandAtEnd(int hand, int& end, double& range, bool& bindsThere, bool& tracks, int& freeState,
+            int& heldState) const;
+    /**
      * Get the distance of binding sites along filaments, measured in nm, or 0 if a kind of hands binds anywhere.
      */
     double getHandSiteSpacing(int hand) const;
@@ -301,8 +318,8 @@ public:
         return branchJoints.size();
     }
     /**
-     * Hold the chains that begin as branches by a nucleator of the CylinderChainGrowthForce: by a linker of each of some
-     * types, which have two hands, the first of them on the mother, and a concentration of zero.  When one of its
+     * Hold the chains that begin as branches by a nucleator of the CylinderChainGrowthForce: by a linker of each of
+     * some types, which have two hands, the first of them on the mother, and a concentration of zero.  When one of its
      * linkers lets go, all do.
      *
      * @param nucleator   the index of the nucleator

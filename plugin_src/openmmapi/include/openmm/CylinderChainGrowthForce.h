@@ -129,8 +129,8 @@ public:
      */
     void getEndTiming(int index, int end, bool& isRegular, double& stiffness) const;
     /**
-     * Let the states of the ends of a chain be those of the monomers there.  Monomers inside change as they would at the
-     * plus end, and have the state then that they have come to when they are at an end again.
+     * Let the states of the ends of a chain be those of the monomers there.  Monomers inside change as they would at
+     * the plus end, and have the state then that they have come to when they are at an end again.
      *
      * @param index  the index of the chain among those that grow
      */

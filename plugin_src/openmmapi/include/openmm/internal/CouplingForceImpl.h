@@ -4,6 +4,7 @@
 #include "dynamics/BrokenCoupling.h"
 #include "couplings/Surroundings.h"
 #include "growth/GrowthSystem.h"
+#include "kinetics/Linkers.h"
 #include "networks/CoupledForces.h"
 #include "openmm/CylinderChainCoupling.h"
 #include "openmm/Vec3.h"
@@ -91,6 +92,16 @@ public:
      * Take note that chains have grown or shrunk, whether they have other nodes or not, have begun, or were cut.
      */
     virtual void chainsHaveGrown(ContextImpl&, const cylchain::ChainList&, const cylchain::GrowthChanges&) {
+    }
+    /**
+     * Add the ends of chains the states of which it changes now.
+     */
+    virtual void findHeldEnds(std::vector<cylchain::HeldEnd>&) {
+    }
+    /**
+     * Add what it may change ends of chains from and to, with no chain.
+     */
+    virtual void findChangesOfEnds(std::vector<cylchain::HeldEnd>&) const {
     }
     /**
      * Describe it as the ends of chains feel it that grow; NULL if it cannot act on them.

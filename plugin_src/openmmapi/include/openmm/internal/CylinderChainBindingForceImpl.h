@@ -57,6 +57,8 @@ public:
     int getOrder() const {
         return 1;
     }
+    void findHeldEnds(std::vector<cylchain::HeldEnd>& ends);
+    void findChangesOfEnds(std::vector<cylchain::HeldEnd>& ends) const;
     void chainsHaveGrown(ContextImpl& context, const cylchain::ChainList& chains,
             const cylchain::GrowthChanges& changes);
     std::unique_ptr<cylchain::Surroundings> describeSurroundings(const cylchain::ChainList& chains,

@@ -63,6 +63,7 @@ private:
     void setState(const cylchain::GrowthState& replaced);
     void findCouplings();
     void refusePlaces();
+    void changeEnds();
     void setSpareNodes(const std::vector<int>& changed);
     const CylinderChainGrowthForce& owner;
     ContextImpl* context;

@@ -1,0 +1,222 @@
+"""[[nucleation]] and [[branching]]: filaments that begin while a run goes on, and how."""
+
+import dataclasses
+
+from ...couplings.shapes import Box, Sphere
+from ...kinetics.branching import Branching
+from ...kinetics.nucleation import Nucleation
+from ...units import quantities as units
+from ..keys import REQUIRED, Inline, Key, Listing, Quantity, Whole, direction
+from ..table import TableKind
+from .filament import MOST_NODES, reserve_group
+from .filament_types import TYPE_KEYS, read_filament_type
+from .monomers import GROWTH, GROWTH_EXAMPLE, read_growth
+from .shapes import REGION, REGION_EXAMPLE, Region
+
+_WHICH = (
+    Key(
+        "table",
+        Whole(1, None, "1"),
+        None,
+        "Number of a [[filament]] table, counted from 1: new filaments are of its type, and grow as its own do.",
+    ),
+    Key(
+        "count",
+        Whole(1, MOST_NODES, "100"),
+        REQUIRED,
+        "How many places there are for them: so many can be there at once. One that vanishes leaves its place.",
+    ),
+)
+_OF_NEW_ONES = (
+    Key("length", Quantity(units.LENGTH), None, "Of a new filament; the shortest of its growth if not given."),
+    Key(
+        "order",
+        Whole(0, 100, "3"),
+        0,
+        "Power of the concentration of monomers that the rate goes with as a pool runs dry.",
+    ),
+)
+_OWN_TYPE = (
+    Key("growth", Inline(GROWTH, GROWTH_EXAMPLE), None, "Without a table: as of [[filament]]."),
+    Key("propulsion", Quantity(units.FORCE, "any"), None, "Without a table: as of [[filament]]."),
+    *(dataclasses.replace(key, text=f"Without a table. {key.text}") for key in TYPE_KEYS),
+)
+
+NUCLEATION = TableKind(
+    "nucleation",
+    (
+        *_WHICH,
+        Key(
+            "rate",
+            Quantity(units.RATE_PER_VOLUME, "zero"),
+            None,
+            'How often one begins in a volume, at the first concentration of monomers; "1 nM/s" is one, too.',
+        ),
+        Key("total_rate", Quantity(units.RATE, "zero"), None, "In place of rate: how often one begins in all."),
+        Key(
+            "inside",
+            Inline(REGION, REGION_EXAMPLE),
+            None,
+            "Where first nodes are: a sphere or a box. The periodic box if not given.",
+        ),
+        Key("direction", direction(), None, "Direction of the first segment; any if not given."),
+        *_OF_NEW_ONES,
+        *_OWN_TYPE,
+    ),
+    "Filaments that are not there at first and begin at a rate, see `Nucleation`. A System cannot get more particles "
+    "while it runs, so they have places. Their numbers come after those of all [[filament]] tables.",
+    repeated=True,
+)
+
+BRANCHING = TableKind(
+    "branching",
+    (
+        *_WHICH,
+        Key(
+            "rate",
+            Quantity(units.RATE_PER_LENGTH, "zero"),
+            REQUIRED,
+            "How often one begins for each length of mothers, at the first concentration of monomers.",
+        ),
+        Key(
+            "mothers",
+            Listing(Whole(1, None, "1"), "numbers of [[filament]] tables", "[1]"),
+            None,
+            "Whose filaments, but not their branches, have branches; all that grow, and branches too, if not given.",
+        ),
+        Key("angle", Quantity(units.ANGLE), None, "At which branches leave their mothers: 70 degrees if not given."),
+        Key(
+            "angular_stiffness",
+            Quantity(units.ENERGY),
+            None,
+            "Of that angle, K in K (theta-theta0)^2/2: 275 pN*nm if not given.",
+        ),
+        Key("stiffness", Quantity(units.STIFFNESS), None, "Of the spring at the first node: 40 pN/nm if not given."),
+        Key("lever", Quantity(units.LENGTH), None, "Of the strut that holds the angle: 10 nm if not given."),
+        Key(
+            "distance",
+            Quantity(units.LENGTH, "zero"),
+            None,
+            "From the axis of the mother to the first node; with [contacts] their diameter, or zero, if not given.",
+        ),
+        Key("debranching_rate", Quantity(units.RATE, "zero"), None, "At which a branch lets go; never if not given."),
+        Key("debranching_force", Quantity(units.FORCE), None, "Force that makes it let go e times as often."),
+        Key("inside", Inline(REGION, REGION_EXAMPLE), None, "Where mothers have them: a sphere or a box."),
+        *_OF_NEW_ONES,
+        *_OWN_TYPE,
+    ),
+    "Filaments that begin on the side of others, at an angle, see `Branching`. Their minus ends should be capped.",
+    repeated=True,
+)
+
+_SHARED = ("length", "order")
+_OF_BRANCHES = (
+    "angle",
+    "angular_stiffness",
+    "stiffness",
+    "lever",
+    "distance",
+    "debranching_rate",
+    "debranching_force",
+)
+
+
+def read_nucleation(entries, groups, solvent, box, monomers):
+    """The FilamentGroup of a [[nucleation]] table, for FilamentGroups of [[filament]] tables and MonomerGroups."""
+    entries.only_one("rate", "total_rate")
+    if not entries.given("rate", "total_rate"):
+        entries.require("rate")
+    region = _region(entries)
+    if region is None and box is None:
+        raise entries.error(f"does not say where filaments begin: add a [box], or inside = {REGION_EXAMPLE}")
+    rate = entries["total_rate"]
+    if rate is None:
+        rate = entries["rate"] * units.RATE_PER_VOLUME
+    with entries.naming():
+        own = Nucleation(rate=rate, region=region, **entries.given("direction", *_SHARED))
+    return _group(entries, groups, solvent, monomers, own)
+
+
+def read_branching(entries, groups, solvent, monomers, contacts):
+    """The FilamentGroup of a [[branching]] table, for those of all other tables, in the order of their filaments.
+
+    ``contacts`` are the Entries of [contacts], or None.
+    """
+    # Branches that begin within the contact of their mothers would not begin at all.
+    distance = {} if contacts is None else {"distance": contacts["diameter"]}
+    with entries.naming():
+        own = Branching(
+            rate=entries["rate"],
+            region=_region(entries),
+            mothers=_mothers(entries, groups),
+            **{**distance, **entries.given(*_OF_BRANCHES, *_SHARED)},
+        )
+    return _group(entries, groups, solvent, monomers, own)
+
+
+def _group(entries, groups, solvent, monomers, nucleation):
+    kind, growth, others = _which(entries, groups, solvent, monomers)
+    if nucleation.length is not None and nucleation.length > growth.longest:
+        raise entries.at("length").error(f"must not exceed the longest of its growth, {growth.longest:g} nm.")
+    path = entries.place.path
+    return reserve_group(entries, kind, growth, entries["count"], nucleation=nucleation, own_path=path, **others)
+
+
+def _which(entries, groups, solvent, monomers):
+    # Their type, their growth, and what else is that of their table.
+    own = [key.name for key in _OWN_TYPE]
+    if "table" not in entries:
+        if not entries.given(*own):
+            raise entries.error("does not say which filaments begin: add table = 1, or a type and its growth.")
+        kind = read_filament_type(entries, solvent)
+        entries.require("growth")
+        return kind, read_growth(entries["growth"], monomers), {"propulsion": entries["propulsion"] or 0.0, "table": 0}
+    entries.refuse(own, "is that of the table whose number is given: leave one of them out.")
+    found = [group for group in groups if group.path == ("filament", entries["table"] - 1)]
+    if not found:
+        raise entries.at("table").error(f"is {entries['table']}, but there is no such [[filament]] table.")
+    first = found[0]
+    if first.growth is None:
+        raise entries.at("table").error(
+            f"is {entries['table']}, whose filaments do not grow: add to it a line such as growth = {GROWTH_EXAMPLE}"
+        )
+    shared = {"propulsion": first.propulsion, "planar": first.planar, "height": first.height}
+    return first.type, first.growth, {**shared, "table": entries["table"]}
+
+
+def _region(entries):
+    if entries["inside"] is None:
+        return None
+    shape = Region(entries["inside"]).shape
+    if not isinstance(shape, (Sphere, Box)):
+        raise entries["inside"].at("shape").error("must be a sphere or a box where filaments begin.")
+    return shape
+
+
+def _mothers(entries, groups):
+    if entries["mothers"] is None:
+        return None
+    numbers, first = [], 0
+    for group in groups:
+        if group.table in entries["mothers"] and not isinstance(group.nucleation, Branching):
+            numbers += range(first, first + group.count)
+        first += group.count
+    for table in entries["mothers"]:
+        found = [group for group in groups if group.table == table]
+        if not found or found[0].growth is None:
+            what = "whose filaments do not grow" if found else "but there is no such [[filament]] table"
+            raise entries.at("mothers").error(f"names {table}, {what}: name others, or leave mothers out.")
+    return numbers
+
+
+def check_places(tables, groups):
+    """Raise ConfigurationError for a table whose filaments are cut, but have no places for their parts."""
+    for group in groups:
+        severing = None if group.growth is None else group.growth.severing
+        # Parts take any place of the same type and growth.
+        if severing is None or any(own.is_reserve and own.growth is group.growth for own in groups):
+            continue
+        name, index = group.path
+        raise tables[name][index].error(
+            "has filaments that are cut, and no places for their parts: add a line such as reserve = 100"
+        )

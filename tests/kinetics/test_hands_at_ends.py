@@ -1,0 +1,154 @@
+"""Hands that bind at the ends of filaments that grow, stay there, and change what these do."""
+
+import numpy as np
+import openmm
+import pytest
+from openmm import unit
+
+from openmm_cylchain import (
+    F_ACTIN,
+    Crosslinker,
+    EndStates,
+    Filaments,
+    Growth,
+    Hand,
+    HandAtEnd,
+    InputError,
+    MonomerPool,
+    Monomers,
+)
+
+pytest.importorskip("openmm_cylchain.plugin")
+
+PER_SECOND = 1 / unit.second
+PER_CONCENTRATION = 1e6 * unit.liter / unit.mole / unit.second
+ACTIN = F_ACTIN.with_segment_length(108.0)
+FILAMENTS = 48
+
+
+def states(free, held, off=(0.0, 0.0)):
+    """An end that gains so many monomers per second at 1 uM, without and with a hand."""
+    return EndStates(
+        on_rates=[free * PER_CONCENTRATION, held * PER_CONCENTRATION],
+        off_rates=[rate * PER_SECOND for rate in off],
+        switch_rates=np.zeros((2, 2)),
+        names=["free", "held"],
+    )
+
+
+def formin(**changes):
+    at_end = dict(end="plus", range=20.0, binds_there=True, tracks=True, changes=("free", "held"))
+    return Hand(
+        binding_rate=PER_SECOND,
+        reach=10.0,
+        unbinding_rate=2 * PER_SECOND,
+        filament_end=HandAtEnd(**{**at_end, **changes}),
+    )
+
+
+def system_with(hand, plus, concentration=5e-4):
+    filaments = Filaments(viscosity=1e-3 * unit.pascal * unit.second, temperature=298.0)
+    growth = Growth(
+        monomers=Monomers(length=2.7), pool=MonomerPool(1e-6 * unit.molar), longest=1200.0, plus_instability=plus
+    )
+    for number in range(FILAMENTS):
+        filaments.add_equilibrium(ACTIN, segments=6, seed=number + 1, growth=growth)
+    other = Hand(binding_rate=0.0, reach=10.0, unbinding_rate=0.0)
+    filaments.add_linkers(
+        Crosslinker(hands=[hand, other], stiffness=0.1, rest_length=10.0), concentration=concentration
+    )
+    return filaments, *filaments.build()
+
+
+def context_of(hand, plus, step=1.0, **options):
+    filaments, _, system, positions = system_with(hand, plus, **options)
+    integrator = filaments.create_integrator(system, step * unit.millisecond, random_seed=3, checks=False)
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
+    context.setPositions(positions)
+    return filaments.in_context(context), integrator
+
+
+def test_formins_stay_at_the_ends_that_they_slow_down():
+    inside, integrator = context_of(formin(), states(20.0, 4.0))
+    integrator.step(500)
+    start, held = inside.growth(), []
+    for _ in range(60):
+        integrator.step(20)
+        growth, linkers = inside.growth(), inside.linkers()
+        bound = linkers.filaments[:, 0] >= 0
+        ends = 2.7 * growth.monomers[linkers.filaments[bound, 0], 1]
+        assert linkers.arc_lengths[bound, 0] == pytest.approx(ends, abs=1e-6)
+        held.append(np.mean(growth.end_states[:, 1]))
+    gained = (inside.growth().gained - start.gained)[:, 1] / 1.2
+    expected = 4.0 * np.mean(held) + 20.0 * (1.0 - np.mean(held))
+    assert 0.2 < np.mean(held) < 0.8
+    assert abs(gained.mean() - expected) < 4 * np.sqrt(expected / 1.2 / FILAMENTS)
+
+
+def test_a_hand_that_blocks_the_end_stops_it():
+    inside, integrator = context_of(formin(), states(20.0, 0.0), concentration=1.0)
+    integrator.step(100)
+    before = inside.growth().gained[:, 1]
+    assert np.all(inside.growth().end_states[:, 1] == 1)
+    integrator.step(50)
+    # A formin lets go now and then, and another one comes at once.
+    assert (inside.growth().gained[:, 1] - before).sum() < 0.05 * 20.0 * 0.05 * FILAMENTS
+
+
+def test_hands_stay_at_ends_that_shrink():
+    inside, integrator = context_of(formin(changes=None), states(0.0, 0.0, off=(200.0, 0.0)), step=2.0)
+    integrator.step(150)
+    growth, linkers = inside.growth(), inside.linkers()
+    bound = linkers.filaments[:, 0] >= 0
+    assert bound.any() and growth.lost[:, 1].sum() > 1000
+    ends = 2.7 * growth.monomers[linkers.filaments[bound, 0], 1]
+    assert linkers.arc_lengths[bound, 0] == pytest.approx(ends, abs=1e-6)
+
+
+def test_a_system_keeps_what_hands_do_at_ends():
+    _, _, system, _ = system_with(formin(), states(20.0, 4.0))
+    copy = openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(system))
+    assert openmm.XmlSerializer.serialize(copy) == openmm.XmlSerializer.serialize(system)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: HandAtEnd(end="middle", range=1.0), "end"),
+        (lambda: HandAtEnd(end="plus", range=0.0), "range"),
+        (lambda: HandAtEnd(end="plus", range=1.0, changes=("free",)), "two different states"),
+        (lambda: HandAtEnd(end="plus", range=1.0, tracks=1.0), "tracks"),
+        (lambda: Hand(binding_rate=1.0, reach=1.0, unbinding_rate=1.0, filament_end="plus"), "filament_end"),
+        (lambda: system_with(formin(changes=("free", "slow")), states(20.0, 4.0)), "no filament has"),
+    ],
+)
+def test_wrong_ends_are_refused(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+def test_the_first_node_of_a_capped_end_has_a_tether():
+    filaments = Filaments(viscosity=1e-3 * unit.pascal * unit.second, temperature=298.0)
+    monomers = Monomers(length=2.7, plus_on_rate=50 * PER_CONCENTRATION, plus_off_rate=PER_SECOND)
+    growth = Growth(monomers=monomers, pool=1e-6 * unit.molar, longest=1200.0, minus_capped=True)
+    for number in range(FILAMENTS):
+        filaments.add_equilibrium(ACTIN, segments=4, seed=number + 1, start=[0, 0, 0], growth=growth)
+        filaments.add_tether(number, 0, [0, 0, 0], 0.5)
+    with pytest.raises(InputError, match="minus_capped=True"):
+        filaments.add_tether(0, 1, [0, 0, 0], 0.5)
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 0.2 * unit.millisecond, random_seed=3, checks=False)
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
+    context.setPositions(positions)
+    first, squares = [nodes[0] for nodes in filaments.node_indices], []
+    integrator.step(100)
+    for _ in range(100):
+        integrator.step(20)
+        state = context.getState(getPositions=True)
+        squares.append(np.sum(state.getPositions(asNumpy=True)._value[first] ** 2, axis=1))
+    # 3 k_BT/k, and the filaments have grown.
+    expected = 3 * 0.00831446 * 298.0 / 0.5
+    means = np.mean(squares, axis=0)
+    assert abs(means.mean() - expected) < 4 * means.std() / np.sqrt(FILAMENTS)
+    assert means.std() / np.sqrt(FILAMENTS) < 0.02 * expected
+    assert np.all(filaments.in_context(context).growth().gained[:, 1] > 10)
