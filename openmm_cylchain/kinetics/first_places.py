@@ -28,7 +28,7 @@ Places = tuple[IntArray, FloatArray]
 def contour_of(filament: Filament) -> FloatArray:
     """Where the segments of a filament begin along it, with segments at rest, and its length: (segments + 1,) in nm.
 
-    A zero alone of a filament that has not begun.
+    Of one that is not there yet, (1,).
     """
     if filament.is_reserve:
         return np.zeros(1)
@@ -53,7 +53,7 @@ class FirstPlaces:
         if count == 0:
             return np.zeros(0, dtype=int), np.zeros(0)
         lengths = np.where(self._binds(hand), self._lengths, 0.0)
-        self._refuse_without_filaments(hand, count, name)
+        _refuse_without_length(lengths, count, name)
         if hand.site_spacing is None:
             chains = generator.choice(len(lengths), count, p=lengths / lengths.sum())
             return chains, generator.uniform(0.0, lengths[chains])
@@ -82,7 +82,7 @@ class FirstPlaces:
         found: list[tuple[int, int, float]] = []
         if count == 0:
             return np.zeros(0, dtype=int), (np.zeros(0, dtype=int), np.zeros(0))
-        self._refuse_without_filaments(hand, count, kind.name)
+        _refuse_without_length(self._lengths[self._binds(hand)], count, kind.name)
         starts, vectors, chains, begins, lengths, bows = self._segments(hand)
         squares = np.sum(vectors**2, axis=1)
         halves = 0.5 * vectors
@@ -176,11 +176,7 @@ class FirstPlaces:
         return vectors if self._box is None else to_nearest_images(vectors, self._box)
 
     def _binds(self, hand):
-        return np.array([hand.binds(filament.type) and not filament.is_reserve for filament in self._filaments])
-
-    def _refuse_without_filaments(self, hand, count, name):
-        if not np.any(self._binds(hand)):
-            raise InputError(f"Linkers {name!r}: {count} are to begin bound, but there is no filament to bind to yet.")
+        return np.array([hand.binds(filament.type) for filament in self._filaments])
 
     def _sites(self, spacing, lengths):
         return np.floor(np.minimum(lengths / spacing, _MOST_SITES) + 1e-9).astype(int)
@@ -192,6 +188,14 @@ class FirstPlaces:
         own = np.column_stack([chains, numbers])
         self._taken[spacing] = np.concatenate([self._taken_sites(spacing), own])
         return chains, (numbers + 0.5) * spacing
+
+
+def _refuse_without_length(lengths, count, name):
+    if not np.any(lengths > 0.0):
+        raise InputError(
+            f"Linkers {name!r}: {count} are to begin bound, but of the filaments that their hands bind to none is "
+            "there yet: let them begin unbound."
+        )
 
 
 def _open_curve(filament):

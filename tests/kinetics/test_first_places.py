@@ -134,5 +134,5 @@ def test_no_linker_begins_on_filaments_that_are_not_there_yet():
 def test_linkers_are_refused_that_begin_on_a_reserve_alone(linkers):
     filaments = reserve(Filaments(VISCOSITY, TEMPERATURE, engine="compiled"))
     filaments.add_linkers(SPRING, bound=1, **linkers)
-    with pytest.raises(InputError, match="no filament to bind to yet"):
+    with pytest.raises(InputError, match="none is there yet"):
         begun(filaments)

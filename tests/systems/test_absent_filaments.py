@@ -269,7 +269,7 @@ def test_linkers_begin_on_filaments_that_are_there(anchors, spacing):
     simulation.step(100)
     assert not (inside.linkers().filaments > 0).any() and len(inside.linker_pulls().numbers) >= 0
     assert np.nanmax(inside.linker_places()._value) < 1e4
-    with pytest.raises(InputError, match="'link': 10 are to begin bound, but there is no filament to bind to yet"):
+    with pytest.raises(InputError, match="'link': 10 are to begin bound, but of the filaments .* none is there yet"):
         linked(0, 10, anchors, spacing).build()
     none = linked(0, 0, anchors, spacing)
     simulation = simulated(none, *none.build())
