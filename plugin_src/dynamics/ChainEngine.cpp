@@ -110,7 +110,8 @@ void fillLane(ChainPack<double>& pack, PropertyRows<double>& properties, int lan
     for (size_t node = 0; node < unrolled; node++)
         properties.at(node, Pack::Mobile)[lane] = chain.fixed[node%own] ? 0 : 1;
     pack.free[lane] = any_of(chain.fixed.begin(), chain.fixed.end(), [] (bool fixed) {return fixed;}) ? 0.0 : 1.0;
-    pack.turning[lane] = turnsFreely(chain) ? 1/frictionOfTurning(chain) : 0;
+    // Where joints turn as well, they take half of what a part of a step may turn.
+    pack.turning[lane] = turnsFreely(chain) ? (chain.joints.empty() ? 1 : 2)/frictionOfTurning(chain) : 0;
     pack.nodeFriction[lane] = chain.nodeFriction;
     pack.rootNodeFriction[lane] = sqrt(chain.nodeFriction);
     for (size_t node = 1; node < unrolled-1; node++)

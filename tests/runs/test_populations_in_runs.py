@@ -161,7 +161,7 @@ def test_they_begin_anywhere_in_a_periodic_box(tmp_path):
             {"filament": FILAMENT + 'growth = { longest = "1 um", severing_states = ["ADP"] }\n'},
         ),
         (
-            "There is no end state 'ADP'",
+            "Monomers that do not age have no states",
             (),
             {"filament": FILAMENT + SEVERING.replace(" }", ', severing_states = ["ADP"] }') + "reserve = 3\n"},
         ),
