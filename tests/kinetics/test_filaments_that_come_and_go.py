@@ -109,7 +109,7 @@ def nucleating(step, ratio, turnover, expected, region, surround=None, viscosity
         (10.0, 0.5, 5.0, 120.0, 200),
         (100.0, 0.5, 5.0, 80.0, 200),
         pytest.param(10.0, 0.8, 8.0, 80.0, 1500, marks=pytest.mark.slow),
-        pytest.param(1000.0, 0.7, 20.0, 40.0, 300, marks=pytest.mark.slow),
+        pytest.param(1000.0, 0.7, 20.0, 40.0, 450, marks=pytest.mark.slow),
     ],
 )
 def test_numbers_and_lengths_of_free_filaments(microseconds, ratio, turnover, expected, steps):
