@@ -109,7 +109,7 @@ def nucleating(step, ratio, turnover, expected, region, surround=None, viscosity
         (10.0, 0.5, 5.0, 120.0, 200),
         (100.0, 0.5, 5.0, 80.0, 200),
         pytest.param(10.0, 0.8, 8.0, 80.0, 1500, marks=pytest.mark.slow),
-        pytest.param(1000.0, 0.7, 20.0, 40.0, 450, marks=pytest.mark.slow),
+        pytest.param(1000.0, 0.7, 20.0, 40.0, 600, marks=pytest.mark.slow),
     ],
 )
 def test_numbers_and_lengths_of_free_filaments(microseconds, ratio, turnover, expected, steps):
@@ -117,7 +117,8 @@ def test_numbers_and_lengths_of_free_filaments(microseconds, ratio, turnover, ex
     step = microseconds * MICROSECOND
     filaments, system, context = nucleating(step, ratio, turnover, expected, Sphere([0, 0, 0], 500.0))
     context.getIntegrator().step(steps // 4)
-    numbers, monomers, lengths, bends = blocks(filaments, system, context, steps)
+    looks = min(30, steps // 20)
+    numbers, monomers, lengths, bends = blocks(filaments, system, context, steps, looks)
     mean_within(numbers, expected, 0.07)
     mean_within([own.mean() for own in monomers], FEWEST + ratio / (1.0 - ratio), 0.05)
     mean_within(lengths, 0.5, 0.05)
