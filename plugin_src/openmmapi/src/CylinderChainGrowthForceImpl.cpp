@@ -401,6 +401,7 @@ void CylinderChainGrowthForceImpl::restoreState(const StateColumns& columns) {
     requireOfGrowing(ends.size() == 2*growing.size() && events.size() == 3*ends.size() && population.size() == 5 &&
             times.size() == states.size(), "A State or checkpoint has the growth of another number of chains");
     vector<MonomerRange> ranges;
+    ranges.reserve(growing.size());
     for (size_t i = 0; i < growing.size(); i++)
         ranges.push_back({ends[2*i], ends[2*i+1]});
     GrowthState replaced(system, ranges);
