@@ -56,8 +56,8 @@ template <class Scalar> struct ChainPack : PackShape {
     /** One for each lane whose chain has no node that is fixed; zero for others. */
     std::vector<Scalar> free;
     /**
-     * One over the friction of each lane's chain as a rod against turning, or twice that if it has joints; zero if it is
-     * held.
+     * One over the friction of each lane's chain as a rod against turning, or twice that if it has joints; zero if it
+     * is held.
      */
     std::vector<double> turning;
     /** Friction of the nodes of each lane, and its square root. */

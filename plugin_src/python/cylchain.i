@@ -236,7 +236,8 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         double& stallForce, double& volume, double& concentration, double& elementLength, double& stretchingModulus,
         double& bendingRigidity, double& shortening, double& rate, double& angle,
         double& distance, double& beyond, double& range};
-%apply bool& OUTPUT {bool& walksBackward, bool& holdsAtEnds, bool& sameChain, bool& vanishes, bool& isRegular, bool& bindsThere, bool& tracks};
+%apply bool& OUTPUT {bool& walksBackward, bool& holdsAtEnds, bool& sameChain, bool& vanishes, bool& isRegular,
+        bool& bindsThere, bool& tracks};
 %apply long long& OUTPUT {long long& bindings, long long& unbindings};
 
 %pythoncode %{
