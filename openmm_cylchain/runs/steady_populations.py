@@ -46,11 +46,12 @@ def steady_population(groups, box, concentration):
         return None
     number = length = 0.0
     for own in nucleations:
-        first = fewest if own.length is None else round(own.length / growth.monomers.length)
-        times = _times(ends, concentration, fewest, first, most)
+        times = _times(ends, concentration, fewest, own.monomers(growth, kind), most)
         if times is None or times[-1] > _MOST_AT_LONGEST * times.sum():
             return None
-        rate = own.whole_rate(box) * (concentration / growth.pool.concentration) ** own.order
+        # Of no monomers at first, no power but the zeroth begins filaments.
+        share = concentration / growth.pool.concentration if growth.pool.concentration > 0.0 else 0.0
+        rate = own.whole_rate(box) * share**own.order
         number += rate * times.sum()
         length += rate * (times @ np.arange(fewest, most + 1)) * growth.monomers.length
     return SteadyPopulation(number, length / number) if number > 0.0 else None

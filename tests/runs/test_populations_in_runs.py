@@ -220,6 +220,8 @@ def test_numbers_in_the_long_run_are_those_of_mass_action():
     # Above the concentration at which they treadmill, they become as long as they may, and there is no such number.
     assert _steady(GROWTH, nucleation, "0.2 uM")[2] is None
     assert _steady(GROWTH.replace("vanishes = true", "vanishes = false"), nucleation)[2] is None
+    # Without monomers they are as they begin, for 1/k_off.
+    assert _steady(GROWTH, nucleation, "0 uM")[2].number == pytest.approx(0.5 / off, rel=1e-9)
 
 
 def growth_type():
