@@ -210,6 +210,7 @@ public:
     /** The instruction set in use: "avx512", "avx2" or "baseline". */
     static std::string getInstructionSet();
 private:
+    ChainEngine(const std::vector<Chain>& chains, const std::vector<PieceOfChain>& origins, bool mayChange);
     struct Implementation;
     std::unique_ptr<Implementation> implementation;
 };

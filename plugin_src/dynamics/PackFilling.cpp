@@ -1,0 +1,115 @@
+#include "dynamics/PackFilling.h"
+#include "dynamics/PackPlaces.h"
+#include "lanes/InstructionSet.h"
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+using namespace cylchain;
+using namespace std;
+
+namespace {
+
+bool hasSegmentFriction(const Chain& chain) {
+    return any_of(chain.segments.begin(), chain.segments.end(), [] (const Segment& segment) {
+        return segment.parallel > 0 || segment.perpendicular > 0 || segment.rotational > 0 || segment.extensional > 0;
+    });
+}
+
+/** Find the friction of a chain against turning if it were straight. */
+double frictionOfTurning(const Chain& chain) {
+    double length = 0, centre = 0, friction = 0, weight = 0;
+    for (const Segment& segment : chain.segments) {
+        const double middle = length+0.5*segment.restLength;
+        centre += segment.perpendicular*middle;
+        weight += segment.perpendicular;
+        length += segment.restLength;
+    }
+    centre /= weight;
+    length = 0;
+    for (const Segment& segment : chain.segments) {
+        const double arm = length+0.5*segment.restLength-centre;
+        friction += segment.rotational+segment.perpendicular*arm*arm;
+        length += segment.restLength;
+    }
+    return friction;
+}
+
+/** Whether a chain turns as a rod does: its segments have friction, and nothing holds it. */
+bool turnsFreely(const Chain& chain) {
+    return !chain.closed && isAngular(chain.bending) && hasSegmentFriction(chain) && chain.tethers.empty() &&
+            none_of(chain.fixed.begin(), chain.fixed.end(), [] (bool fixed) {return fixed;});
+}
+
+void fillLane(ChainPack<double>& pack, PropertyRows<double>& properties, int lane, const Chain& chain, int index) {
+    typedef ChainPack<double> Pack;
+    const size_t own = chain.nodes.size(), unrolled = own+(chain.closed ? 2 : 0);
+    placeChain(pack, lane, chain, index);
+    for (size_t node = 0; node < unrolled; node++)
+        properties.at(node, Pack::Mobile)[lane] = chain.fixed[node%own] ? 0 : 1;
+    pack.free[lane] = any_of(chain.fixed.begin(), chain.fixed.end(), [] (bool fixed) {return fixed;}) ? 0.0 : 1.0;
+    // Where joints turn as well, they take half of what a part of a step may turn.
+    pack.turning[lane] = turnsFreely(chain) ? (chain.joints.empty() ? 1 : 2)/frictionOfTurning(chain) : 0;
+    pack.nodeFriction[lane] = chain.nodeFriction;
+    pack.rootNodeFriction[lane] = sqrt(chain.nodeFriction);
+    for (size_t node = 1; node < unrolled-1; node++)
+        properties.at(node, Pack::Joint)[lane] = chain.joints[chain.closed ? node%own : node-1];
+    for (size_t s = 0; s < unrolled-1; s++)
+        properties.setSegment(s, lane, chain.segments[s%chain.segments.size()], chain.planar ? 2 : 3);
+}
+
+} // namespace
+
+const ChainKernels& cylchain::bestKernels() {
+    static const ChainKernels& best = loopsOfBest<baselineKernels, avx2Kernels, avx512Kernels>();
+    return best;
+}
+
+bool cylchain::mayShareLanes(const Chain& longest, const Chain& chain, double filling) {
+    const size_t least = longest.closed ? longest.segments.size() : ceil((1-filling)*longest.segments.size());
+    return hasSegmentFriction(chain) == hasSegmentFriction(longest) &&
+            (chain.nodeFriction > 0) == (longest.nodeFriction > 0) && chain.bending == longest.bending &&
+            chain.stretching == longest.stretching && chain.closed == longest.closed &&
+            chain.planar == longest.planar && chain.segments.size() >= least;
+}
+
+template <class Scalar> ChainPack<Scalar> cylchain::packWithoutChains(const PackShape& shape, int lanes) {
+    ChainPack<Scalar> pack = emptyPack<Scalar>(shape, lanes);
+    pack.free.resize(lanes);
+    pack.turning.resize(lanes);
+    pack.nodeFriction.resize(lanes);
+    pack.rootNodeFriction.resize(lanes);
+    return pack;
+}
+
+template ChainPack<double> cylchain::packWithoutChains<double>(const PackShape& shape, int lanes);
+template ChainPack<float> cylchain::packWithoutChains<float>(const PackShape& shape, int lanes);
+
+ChainPack<double> cylchain::packed(const vector<Chain>& chains, const vector<int>& members, int lanes,
+            PropertyTables<double>& tables) {
+    if (members.empty()) {
+        ChainPack<double> none = packWithoutChains<double>({2, 1, {}, {}, false, false, false, true}, lanes);
+        PropertyRows<double>(2, lanes).giveTo(none, tables);
+        return none;
+    }
+    const Chain& longest = chains[members[0]];
+    ChainPack<double> pack = packWithoutChains<double>({(int) longest.nodes.size()+(longest.closed ? 2 : 0),
+            (int) longest.segments.size(), longest.bending, longest.stretching, longest.closed, longest.planar,
+            longest.nodeFriction > 0, hasSegmentFriction(longest)}, lanes);
+    PropertyRows<double> properties(pack.nodes, lanes);
+    for (size_t lane = 0; lane < members.size(); lane++)
+        fillLane(pack, properties, lane, chains[members[lane]], members[lane]);
+    properties.giveTo(pack, tables);
+    sortTethers(pack);
+    return pack;
+}
+
+void cylchain::setOrigins(ChainPack<double>& pack, const vector<PieceOfChain>& origins) {
+    for (LaneTether& tether : pack.tethers)
+        tether.number = origins[pack.chain[tether.lane]].tethers[tether.number];
+    for (int lane = 0; lane < pack.lanes && pack.chain[lane] >= 0; lane++) {
+        const PieceOfChain& origin = origins[pack.chain[lane]];
+        pack.firstNode[lane] = origin.firstNode;
+        pack.chain[lane] = origin.chain;
+    }
+}
