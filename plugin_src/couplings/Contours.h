@@ -28,6 +28,10 @@ public:
     double getBegin(int chain) const {
         return chains[chain].begin;
     }
+    /** The length at which its plus end (1) or its minus end (0) is. */
+    double getEnd(int chain, int end) const {
+        return end == 1 ? chains[chain].begin+chains[chain].length : chains[chain].begin;
+    }
     /** The length of a chain. */
     double getLength(int chain) const {
         return chains[chain].length;

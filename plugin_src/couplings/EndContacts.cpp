@@ -73,8 +73,7 @@ void EndContacts::findNear(const EndChange& change, int own, Near& near) const {
     };
     addEnd(change.before, change.segmentsBefore);
     addEnd(change.after, change.segmentsAfter);
-    const bool isWhole = change.segmentsBefore == 0 || change.segmentsAfter == 0;
-    const double motion = isWhole ? 0 : sqrt((starts[0]-starts[change.segmentsBefore]).squared());
+    const double motion = change.isOfWhole() ? 0 : sqrt((starts[0]-starts[change.segmentsBefore]).squared());
     const double extent = sqrt(square)+known[own].radius;
     for (size_t i = 0; i < known.size(); i++) {
         const Body& body = known[i];
@@ -82,8 +81,8 @@ void EndContacts::findNear(const EndChange& change, int own, Near& near) const {
             continue;
         const double room = extent+body.extent;
         // A chain longer than half a box has images on all sides of itself.
-        const bool isOneImage = box == nullptr || 2*body.extent < min({box[0], box[4], box[8]});
-        if (isOneImage && toNearestImage(body.centre-centre).squared() > room*room)
+        const bool isWhole = box == nullptr || 2*body.extent < min({box[0], box[4], box[8]});
+        if (isWhole && toNearestImage(body.centre-centre).squared() > room*room)
             continue;
         const int count = body.countCapsules(), changing = static_cast<int>(i) == own ? change.segmentsBefore : 0;
         auto changes = [&] (int capsule) {
@@ -254,7 +253,7 @@ double EndContacts::findChange(const EndChange& change) {
     findNear(change, own, near);
     if (isAlone(change, near, own))
         return 0;
-    if (change.segmentsBefore > 0 && change.segmentsAfter > 0 && crosses(change, near, own))
+    if (!change.isOfWhole() && crosses(change, near, own))
         return HUGE_VAL;
     return findEnergy(change, near, own, change.after)-findEnergy(change, near, own, change.before);
 }

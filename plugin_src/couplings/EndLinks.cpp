@@ -14,11 +14,8 @@ bool locateAlong(const vector<Vec3d>& nodes, const vector<double>& along, double
     const double slack = 1e-9*(fabs(length)+1);
     if (along.size() < 2 || length < along.front()-slack || length > along.back()+slack)
         return false;
-    const size_t last = along.size()-2;
-    const size_t segment = min<size_t>(last, max<ptrdiff_t>(0, upper_bound(along.begin(), along.end(), length)-
-            along.begin()-1));
-    const double fraction = (length-along[segment])/(along[segment+1]-along[segment]);
-    place = nodes[segment]+(nodes[segment+1]-nodes[segment])*fraction;
+    const SegmentPlace found = findAlong(along, length);
+    place = nodes[found.segment]+(nodes[found.segment+1]-nodes[found.segment])*found.fraction;
     return true;
 }
 
@@ -74,8 +71,7 @@ double EndLinks::findChange(const EndChange& change) {
         return 0;
     // What is before the segments that change stays where it is.
     const size_t count = change.before.size();
-    const bool isWhole = change.segmentsBefore == 0 || change.segmentsAfter == 0;
-    const double staying = isWhole ? -HUGE_VAL :
+    const double staying = change.isOfWhole() ? -HUGE_VAL :
             change.alongBefore[change.end == 1 ? count-1-change.segmentsBefore : change.segmentsBefore];
     double difference = 0;
     for (int i : found->second) {

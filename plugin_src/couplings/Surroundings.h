@@ -3,6 +3,7 @@
 
 #include "couplings/CapsuleGeometry.h"
 #include "mechanics/ChainList.h"
+#include <algorithm>
 #include <vector>
 
 namespace cylchain {
@@ -24,11 +25,29 @@ struct EndChange {
     const std::vector<double> &alongBefore, &alongAfter;
     /** Where the new joint is on the segment that is divided, or the old one on that which both become: a fraction. */
     double joint;
+    /** Whether the chain begins or vanishes. */
+    bool isOfWhole() const {
+        return segmentsBefore == 0 || segmentsAfter == 0;
+    }
     /** How many nodes at the end are others, before or after. */
     int countNodes(int segments) const {
-        return segments == 0 ? 0 : segments+(segmentsBefore == 0 || segmentsAfter == 0 ? 1 : 0);
+        return segments == 0 ? 0 : segments+(isOfWhole() ? 1 : 0);
     }
 };
+
+/** A place on a segment of a chain: its number, and a fraction of it. */
+struct SegmentPlace {
+    int segment;
+    double fraction;
+};
+
+/** Find the place at a length along nodes that are at some lengths, of which there are two or more. */
+inline SegmentPlace findAlong(const std::vector<double>& along, double length) {
+    const int last = static_cast<int>(along.size())-2;
+    const int after = std::upper_bound(along.begin(), along.end(), length)-along.begin();
+    const int segment = std::min(last, std::max(0, after-1));
+    return {segment, (length-along[segment])/(along[segment+1]-along[segment])};
+}
 
 /** What the ends of chains feel of all that is around them: their walls, or their contacts. */
 class Surroundings {

@@ -1,4 +1,5 @@
 #include "growth/ChainPopulation.h"
+#include "growth/Directions.h"
 #include "growth/MonomerStates.h"
 #include <algorithm>
 #include <cmath>
@@ -51,8 +52,7 @@ int ChainPopulation::apply(GrowthState& state, const GrowthStep& step, const Gro
 
 Vec3d ChainPopulation::drawDirection(int index, RandomNumbers& random) const {
     const double cosine = shapes.isPlanar(index) ? 0 : 2*random.uniform()-1, azimuth = 2*M_PI*random.uniform();
-    const double sine = sqrt(max(0.0, 1-cosine*cosine));
-    return {sine*cos(azimuth), sine*sin(azimuth), cosine};
+    return findDirection(cosine, azimuth);
 }
 
 Vec3d ChainPopulation::drawPlace(const Nucleator& nucleator, const GrowthStep& step, RandomNumbers& random) const {
@@ -66,11 +66,8 @@ Vec3d ChainPopulation::drawPlace(const Nucleator& nucleator, const GrowthStep& s
             const Vec3d size = nucleator.upper-nucleator.lower;
             return nucleator.lower+Vec3d {size.x*x, size.y*y, size.z*z};
         }
-        case NucleationRegion::Sphere: {
-            const double cosine = 2*y-1, sine = sqrt(max(0.0, 1-cosine*cosine));
-            return nucleator.centre+Vec3d {sine*cos(2*M_PI*z), sine*sin(2*M_PI*z), cosine}*
-                    (nucleator.radius*cbrt(x));
-        }
+        case NucleationRegion::Sphere:
+            return nucleator.centre+findDirection(2*y-1, 2*M_PI*z)*(nucleator.radius*cbrt(x));
     }
     return nucleator.centre;
 }
@@ -130,23 +127,15 @@ bool ChainPopulation::findBranchPlace(const GrowthState& state, const GrowthStep
     if (branch.along+nucleator.branch.beyond > along.back())
         return false;
     const vector<Vec3d>& nodes = chains.getNodes(mother);
-    size_t segment = 0;
-    while (segment+2 < nodes.size() && branch.along > along[segment+1])
-        segment++;
-    const Vec3d between = nodes[segment+1]-nodes[segment];
-    const Vec3d place = nodes[segment]+between*((branch.along-along[segment])/(along[segment+1]-along[segment]));
+    const SegmentPlace found = findAlong(along, branch.along);
+    const Vec3d between = nodes[found.segment+1]-nodes[found.segment];
+    const Vec3d place = nodes[found.segment]+between*found.fraction;
     if (!isInRegion(nucleator, place))
         return false;
-    const Vec3d tangent = between*(1/sqrt(between.squared()));
+    const Vec3d tangent = unit(between);
     const double azimuth = 2*M_PI*random.uniform(), angle = drawAngle(nucleator.branch, step.kT, random);
-    Vec3d across;
-    if (shapes.isPlanar(mother))
-        across = Vec3d {-tangent.y, tangent.x, 0}*(azimuth < M_PI ? 1 : -1);
-    else {
-        Vec3d first = tangent.cross(fabs(tangent.x) < 0.6 ? Vec3d {1, 0, 0} : Vec3d {0, 1, 0});
-        first = first*(1/sqrt(first.squared()));
-        across = first*cos(azimuth)+tangent.cross(first)*sin(azimuth);
-    }
+    const Vec3d across = shapes.isPlanar(mother) ? Vec3d {-tangent.y, tangent.x, 0}*(azimuth < M_PI ? 1 : -1) :
+            findAcross(tangent, azimuth);
     start = place+across*nucleator.branch.distance;
     direction = tangent*cos(angle)+across*sin(angle);
     return true;

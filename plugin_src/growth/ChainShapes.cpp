@@ -1,4 +1,5 @@
 #include "growth/ChainShapes.h"
+#include "growth/Directions.h"
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -7,16 +8,6 @@ using namespace cylchain;
 using namespace std;
 
 namespace {
-
-Vec3d unit(const Vec3d& v) {
-    return v*(1/sqrt(v.squared()));
-}
-
-/** A unit vector across another one. */
-Vec3d findAcross(const Vec3d& along) {
-    const Vec3d axis = fabs(along.x) < 0.6 ? Vec3d {1, 0, 0} : Vec3d {0, 1, 0};
-    return unit(along.cross(axis));
-}
 
 /** Turn a direction in its plane by an angle. */
 Vec3d turnInPlane(const Vec3d& v, double angle) {
@@ -160,7 +151,6 @@ Vec3d ChainShapes::bendFrom(const Vec3d& along, bool flat, const BendLaw& law, R
     const double bend = law.draw(random);
     if (flat)
         return turnInPlane(along, bend);
-    const Vec3d first = findAcross(along), second = along.cross(first);
     const double azimuth = 2*M_PI*random.uniform(), sine = sqrt(max(0.0, (1-bend)*(1+bend)));
-    return along*bend+(first*cos(azimuth)+second*sin(azimuth))*sine;
+    return along*bend+findAcross(along, azimuth)*sine;
 }

@@ -22,10 +22,6 @@ const uint32_t NEW_LINKERS = 0xffffffff;
 /** Of a length along a chain. */
 const double ROUNDING = 1e-9;
 
-double endOf(const Contours& contours, int chain, int end) {
-    return contours.getBegin(chain)+(end == 1 ? contours.getLength(chain) : 0);
-}
-
 uint64_t drawNumber() {
     static atomic<uint64_t> last(0);
     return ++last;
@@ -94,13 +90,13 @@ bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& 
             if (!old.isBound() || contours.isClosed(old.chain))
                 continue;
             const HandAtEnd& atEnd = system.hands[system.types[linker.type].hands[side]].atEnd;
-            const bool wasAtEnd = atEnd.tracks && fabs(place.position-endOf(before, place.chain, atEnd.end)) <=
+            const bool wasAtEnd = atEnd.tracks && fabs(place.position-before.getEnd(place.chain, atEnd.end)) <=
                     ROUNDING*(1+fabs(place.position));
             for (const ChainCut& cut : cuts)
                 if (place.chain == cut.chain && place.position > cut.along)
                     place.chain = cut.part;
             if (wasAtEnd && contours.getLength(place.chain) > 0)
-                place.position = endOf(contours, place.chain, atEnd.end);
+                place.position = contours.getEnd(place.chain, atEnd.end);
             else if (contours.getLength(place.chain) > 0)
                 stayOnChain(linker, side, count);
             else

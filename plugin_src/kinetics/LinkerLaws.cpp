@@ -178,7 +178,7 @@ void LinkerKinetics::stayOnChain(Linker& linker, int side, Count& count) const {
             place.position = max(0.0, place.position-length*rounds);
         return;
     }
-    const double begin = contours.getBegin(place.chain), end = begin+length;
+    const double begin = contours.getBegin(place.chain), end = contours.getEnd(place.chain, 1);
     if (place.position >= begin && place.position <= end)
         return;
     const Hand& hand = system.hands[system.types[linker.type].hands[side]];
@@ -197,7 +197,7 @@ uint64_t LinkerKinetics::siteOf(const Hand& hand, const HandPlace& place) const 
 /** Whether a chain has a site of a number: all of it. */
 bool LinkerKinetics::hasSite(const Hand& hand, int chain, double site) const {
     // A length that is a whole number of spacings has as many sites, however it was rounded.
-    const double begin = contours.getBegin(chain), end = begin+contours.getLength(chain);
+    const double begin = contours.getBegin(chain), end = contours.getEnd(chain, 1);
     return site >= ceil(begin/hand.siteSpacing-1e-9) && site < floor(end/hand.siteSpacing+1e-9);
 }
 
@@ -210,8 +210,7 @@ bool LinkerKinetics::toSite(const Hand& hand, HandPlace& place) const {
 
 /** Bring a hand to the end of its chain; false if it is not near to it. */
 bool LinkerKinetics::toEnd(const Hand& hand, HandPlace& place) const {
-    const double begin = contours.getBegin(place.chain);
-    const double end = hand.atEnd.end == 1 ? begin+contours.getLength(place.chain) : begin;
+    const double end = contours.getEnd(place.chain, hand.atEnd.end);
     if (fabs(place.position-end) > hand.atEnd.range)
         return false;
     place.position = end;

@@ -451,6 +451,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %ignore OpenMM::CylinderChainBindingForce::getBranchJoint;
 %ignore OpenMM::CylinderChainBindingForce::getLinkerType;
 %ignore OpenMM::CylinderChainGrowthForce::getSystem;
+%ignore OpenMM::CylinderChainGrowthForce::getRanges;
 %ignore OpenMM::CylinderChainGrowthForce::getState;
 %ignore OpenMM::CylinderChainGrowthForce::setMonomers;
 %ignore OpenMM::CylinderChainLinkForce::getTable;

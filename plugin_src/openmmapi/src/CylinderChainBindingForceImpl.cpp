@@ -257,8 +257,7 @@ void CylinderChainBindingForceImpl::findHeldEnds(vector<cylchain::HeldEnd>& ends
             if (!place.isBound())
                 continue;
             const cylchain::HandAtEnd& own = system.hands[system.types[linker.type].hands[side]].atEnd;
-            const double end = contours->getBegin(place.chain)+(own.end == 1 ? contours->getLength(place.chain) : 0);
-            if (own.heldState >= 0 && fabs(place.position-end) <= own.range)
+            if (own.heldState >= 0 && fabs(place.position-contours->getEnd(place.chain, own.end)) <= own.range)
                 ends.push_back({place.chain, own.end, own.freeState, own.heldState});
         }
 }

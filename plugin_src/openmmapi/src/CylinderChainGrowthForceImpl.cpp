@@ -153,7 +153,7 @@ void CylinderChainGrowthForceImpl::refusePlaces() {
             const vector<int>& particles = chains->getOwner().getChainParticles(growing[i]);
             for (int particle : particles)
                 comesAndGoes[particle] = true;
-            const bool mayBegin = owner.getState().ranges[i].size() == 0;
+            const bool mayBegin = owner.getRanges()[i].size() == 0;
             comesAndGoes[particles[0]] = own.ends[0].grows() || own.vanishes || mayBegin;
         }
         for (const Place& place : other.first->findPlaces(*places))
@@ -169,12 +169,12 @@ void CylinderChainGrowthForceImpl::refusePlaces() {
 /** Let ends be in the states to which what is bound there changes them, and back in others when it is not. */
 void CylinderChainGrowthForceImpl::changeEnds() {
     vector<HeldEnd> changes, held;
-    for (CouplingForceImpl* coupling : couplings) {
+    for (CouplingForceImpl* coupling : couplings)
         coupling->findChangesOfEnds(changes);
-        coupling->findHeldEnds(held);
-    }
     if (changes.empty())
         return;
+    for (CouplingForceImpl* coupling : couplings)
+        coupling->findHeldEnds(held);
     const int count = growing.size();
     vector<int> indexOf(chains->getDescription().getList().size(), -1);
     for (int i = 0; i < count; i++)
@@ -295,13 +295,12 @@ void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
             replaced.free.size() == system.pools.size(), "A State or checkpoint has the growth of another number of "
             "chains or pools");
     ChainList& list = chains->getGrowingList();
-    const vector<MonomerRange> ofSystem = owner.getState().ranges;
     for (size_t i = 0; i < count; i++) {
         const MonomerRange& range = replaced.ranges[i];
         const GrowingChain& own = system.chains[i];
         const Chain& chain = list.getChain(growing[i]);
         const int most = chain.nodes.size()+chain.spareNodes.size();
-        const bool isNone = range.first == 0 && range.last == 0 && (own.vanishes || ofSystem[i].size() == 0);
+        const bool isNone = range.first == 0 && range.last == 0 && (own.vanishes || owner.getRanges()[i].size() == 0);
         requireOfGrowing(isNone || (range.first < range.last && range.size() >= own.leastMonomers &&
                 SegmentDivision(range, system.tables[own.table].monomersPerSegment).countSegments() < most), "Chain "+
                 to_string(growing[i])+" cannot have monomers "+to_string(range.first)+" to "+to_string(range.last)+

@@ -236,6 +236,12 @@ public:
         return system;
     }
     /**
+     * Get the monomers of chains before anything happens.
+     */
+    const std::vector<cylchain::MonomerRange>& getRanges() const {
+        return ranges;
+    }
+    /**
      * Get how far chains have grown before anything happens.
      */
     cylchain::GrowthState getState() const {
