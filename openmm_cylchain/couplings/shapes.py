@@ -393,3 +393,17 @@ class Ellipsoid(Face):
 
 def _set(instance, name, value):
     object.__setattr__(instance, name, value)
+
+
+def bounds_of(shape: Box | Sphere | Ellipsoid) -> tuple[FloatArray, FloatArray]:
+    """Two opposite corners (3,) in nm of the box around a shape that is closed."""
+    if isinstance(shape, Box):
+        return shape.lower, shape.upper
+    reach = shape.semi_axes if isinstance(shape, Ellipsoid) else np.full(3, shape.radius)
+    return shape.center - reach, shape.center + reach
+
+
+def volume_of(shape: Box | Sphere | Ellipsoid) -> float:
+    """The volume in nm^3 of a shape that is closed."""
+    lower, upper = bounds_of(shape)
+    return float(np.prod(upper - lower)) * (1.0 if isinstance(shape, Box) else np.pi / 6.0)

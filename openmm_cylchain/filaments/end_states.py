@@ -162,6 +162,9 @@ def _reached_from_first(leaving: FloatArray) -> list[int]:
 
 GROWING, SHRINKING = "growing", "shrinking"
 
+ENDS = "minus", "plus"
+"""Of a filament, at its first and its last node."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class DynamicInstability:

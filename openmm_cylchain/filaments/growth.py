@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,7 +27,7 @@ from ..units.quantities import (
 )
 from ..units.types import FloatArray, Indices, Scalar
 from .chain_type import ChainType
-from .end_states import GROWING, SHRINKING, DynamicInstability, EndStates, TwoUnitCap, as_on_rate, as_tuple
+from .end_states import ENDS, GROWING, SHRINKING, DynamicInstability, EndStates, TwoUnitCap, as_on_rate, as_tuple
 from .filament_type import FilamentType
 from .severing import Severing
 
@@ -338,12 +339,18 @@ class Growth:
 
     def states(self, end: str) -> EndStates:
         """What the "plus" or "minus" end does in each of its states."""
+        return self._states_of_ends[end]
+
+    @cached_property
+    def _states_of_ends(self):
+        return {end: self._find_states(end) for end in ENDS}
+
+    def _find_states(self, end):
         instability = getattr(self, f"{end}_instability")
         if isinstance(instability, EndStates):
             return instability
         if instability is not None:
-            own: EndStates = instability.states(*self.rates(end))
-            return own
+            return instability.states(*self.rates(end))
         states = self.monomers.states(end)
         if not getattr(self, f"{end}_capped"):
             return states

@@ -101,10 +101,7 @@ class Branching(Nucleation):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        rate = non_negative(self.rate, _PER_LENGTH, "rate of branching")
-        object.__setattr__(self, "rate", 0.0)
         super().__post_init__()
-        object.__setattr__(self, "rate", rate)
         if self.direction is not None:
             raise InputError("Branches have the direction of their angle: leave direction out.")
         for name, check, target in (
@@ -142,9 +139,12 @@ class Branching(Nucleation):
             )
         return number
 
-    def whole_rate(self, box: object) -> float:
-        """J in 1/ps for each length of mothers in nm."""
-        return self.rate
+    def _convert_rate(self) -> None:
+        object.__setattr__(self, "rate", non_negative(self.rate, _PER_LENGTH, "rate of branching"))
+
+    def whole_rate(self, box: object, mothers: float = 1.0) -> float:
+        """J in 1/ps on mothers of a length in nm, wherever these are."""
+        return self.rate * mothers
 
     @property
     def _strut(self):

@@ -10,7 +10,7 @@ from openmm import unit
 
 from ..engine_choice import load_plugin
 from ..errors import InputError
-from ..filaments.end_states import SHRINKING
+from ..filaments.end_states import ENDS, SHRINKING
 from ..filaments.filament import Filament
 from ..filaments.filament_type import FilamentType
 from ..filaments.grown import count_nodes_of_monomers, rest_lengths
@@ -19,9 +19,9 @@ from ..units.quantities import AVOGADRO, LENGTH, NUMBER_DENSITY, shown
 from ..units.types import BoolArray, FloatArray, IntArray
 from .branching import Branching
 from .first_places import contour_of
+from .nucleation import nucleations_of
 
 GROWTH_FORCE_NAME = "Growth"
-ENDS = ("minus", "plus")
 _MOST_MONOMERS = 10**9
 
 
@@ -47,7 +47,7 @@ def make_growth_force(
     force.setName(GROWTH_FORCE_NAME)
     tables: dict[Any, int] = {}
     pools: dict[int, int] = {}
-    begin: dict[int, list[int]] = {}
+    indices: dict[int, int] = {}
     for number, filament in enumerate(filaments):
         growth, kind = filament.growth, filament.type
         if growth is None or not isinstance(kind, FilamentType):
@@ -64,34 +64,37 @@ def make_growth_force(
         least = growth.fewest_monomers(kind)
         index = force.addGrowingChain(number, tables[key], pools[id(growth.pool)], 0, monomers, least, growth.vanishes)
         _set_ends(force, index, growth)
-        if filament.nucleation is not None:
-            begin.setdefault(id(filament.nucleation), []).append(index)
-    growing = [number for number, filament in enumerate(filaments) if filament.growth is not None]
-    for indices in begin.values():
-        _add_nucleator(force, filaments[growing[indices[0]]], indices, box)
-    for nucleator, branching in branchings_of(filaments):
-        _set_branching(force, nucleator, branching, filaments, growing)
+        indices[number] = index
+    for nucleation, numbers in nucleations_of(filaments):
+        _add_nucleator(force, filaments[numbers[0]], [indices[number] for number in numbers], box)
+        if isinstance(nucleation, Branching):
+            _set_branching(force, nucleation, filaments, indices)
     return force
 
 
 def branchings_of(filaments: Sequence[Filament]) -> list[tuple[int, Branching]]:
     """Those by which filaments begin, with the numbers of their nucleators."""
-    nucleations = list({id(own.nucleation): own.nucleation for own in filaments if own.nucleation is not None}.values())
-    return [(number, own) for number, own in enumerate(nucleations) if isinstance(own, Branching)]
+    nucleations = enumerate(nucleations_of(filaments))
+    return [(number, own) for number, (own, _) in nucleations if isinstance(own, Branching)]
 
 
-def _set_branching(force, nucleator, branching, filaments, growing):
-    mothers = growing if branching.mothers is None else branching.mothers
+def _set_branching(force, branching, filaments, indices):
+    # Of the nucleator that was added last; ``indices`` are those of growing filaments, by their numbers.
+    mothers = list(indices) if branching.mothers is None else branching.mothers
     for number in mothers:
-        if number >= len(filaments) or number not in growing:
+        if number not in indices:
             raise InputError(f"Filament {number} cannot have branches: it does not grow, or does not exist.")
     lengths = {filaments[number].growth.monomers.length for number in mothers}
     if len(lengths) > 1:
         raise InputError("Filaments of different monomers have no branches of one kind: give mothers of one kind.")
-    beyond = branching.lever if len(mothers) else 0.0
-    indices = [growing.index(number) for number in mothers]
-    stiffness = branching.angular_stiffness
-    force.setBranching(nucleator, branching.angle, stiffness, branching.distance, beyond, indices)
+    force.setBranching(
+        force.getNumNucleators() - 1,
+        branching.angle,
+        branching.angular_stiffness,
+        branching.distance,
+        branching.lever,
+        [indices[number] for number in mothers],
+    )
 
 
 def _set_ends(force, index, growth):
@@ -115,11 +118,8 @@ def _set_ends(force, index, growth):
 def _add_nucleator(force, filament, indices, box):
     nucleation, growth = filament.nucleation, filament.growth
     direction = np.zeros(3) if nucleation.direction is None else nucleation.direction
-    rate = nucleation.whole_rate(box)
-    if isinstance(nucleation, Branching):
-        rate *= growth.monomers.length
     force.addNucleator(
-        rate,
+        nucleation.whole_rate(box, growth.monomers.length),
         nucleation.order,
         nucleation.monomers(growth, filament.type),
         *nucleation.described_region,
@@ -217,11 +217,10 @@ def growth_of(context: openmm.Context, filaments: Sequence[Filament]) -> Filamen
 def _counts_of_ends(growths, end_states, events):
     # Gained, lost, waited, whether it shrinks, catastrophes and rescues of each end: (n, 2, 6).
     counts = np.zeros((len(growths), 2, 6), dtype=int)
-    names: dict[tuple[int, str], tuple[str, ...]] = {}
     position = 0
     for index, growth in enumerate(growths):
         for end, name in enumerate(ENDS):
-            own = names.setdefault((id(growth), name), growth.states(name).names)
+            own = growth.states(name).names
             counts[index, end, :3] = events[position : position + 3]
             if SHRINKING in own:
                 entered = events[position + 3 : position + 3 + len(own)]

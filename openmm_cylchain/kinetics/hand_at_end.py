@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from ..filaments.end_states import ENDS
 from ..units.quantities import LENGTH, one_of, positive, shown, true_or_false
 from ..units.types import Scalar
-
-ENDS = ("minus", "plus")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from openmm import unit
 
-from ..couplings.shapes import Box, Sphere
+from ..couplings.shapes import Box, Sphere, bounds_of, volume_of
 from ..errors import InputError
+from ..filaments.filament import Filament
 from ..filaments.filament_type import FilamentType
 from ..filaments.growth import Growth
 from ..units.quantities import (
@@ -88,6 +90,15 @@ class Nucleation:
             raise InputError(
                 f"The region of a Nucleation must be a Sphere, a Box or None, but is {shown(self.region)}."
             )
+        self._convert_rate()
+        if self.length is not None:
+            object.__setattr__(self, "length", positive(self.length, LENGTH, "length of new filaments"))
+        if self.direction is not None:
+            direction = vector(self.direction, unit.dimensionless, "direction of new filaments")
+            object.__setattr__(self, "direction", unit_vector(direction, "Nucleation"))
+        whole_number(self.order, 0, "order of nucleation")
+
+    def _convert_rate(self) -> None:
         rate: Any = self.rate
         if isinstance(rate, unit.Quantity) and rate.unit.is_compatible(_MOLAR * RATE):
             rate = in_units_of(rate, unit.mole * _PER_VOLUME, "rate of nucleation") * AVOGADRO * _PER_VOLUME
@@ -96,18 +107,19 @@ class Nucleation:
             object.__setattr__(self, "rate", non_negative(rate, _PER_VOLUME, "rate of nucleation"))
         else:
             object.__setattr__(self, "rate", non_negative(rate, RATE, "rate of nucleation"))
-        if self.length is not None:
-            object.__setattr__(self, "length", positive(self.length, LENGTH, "length of new filaments"))
-        if self.direction is not None:
-            direction = vector(self.direction, unit.dimensionless, "direction of new filaments")
-            object.__setattr__(self, "direction", unit_vector(direction, "Nucleation"))
-        whole_number(self.order, 0, "order of nucleation")
 
-    def whole_rate(self, box: FloatArray | None) -> float:
-        """J in 1/ps in the whole region, or in a periodic box (3, 3) in nm; InputError if there is none."""
-        if self.region is None and box is None:
+    def whole_rate(self, box: FloatArray | None, mothers: float = 1.0) -> float:
+        """J in 1/ps in the whole region, or in a periodic box (3, 3) in nm; InputError if there is none.
+
+        Of branches that on so long mothers, in nm.
+        """
+        if self.region is not None:
+            volume = volume_of(self.region)
+        elif box is not None:
+            volume = abs(float(np.linalg.det(box)))
+        else:
             raise InputError("A Nucleation needs a region, a Sphere or a Box, since the System has no periodic box.")
-        return self.rate * self._volume(box) if self.is_per_volume else self.rate
+        return self.rate * volume if self.is_per_volume else self.rate
 
     def monomers(self, growth: Growth, filament_type: FilamentType) -> int:
         """How many monomers a new filament has; InputError if it cannot have so many."""
@@ -122,14 +134,6 @@ class Nucleation:
             )
         return number
 
-    def _volume(self, box):
-        if self.region is None:
-            return abs(float(np.linalg.det(box)))
-        kind, numbers = self.described_region
-        return (
-            4.0 / 3.0 * np.pi * numbers[3] ** 3 if kind == 2 else float(np.prod(np.subtract(numbers[3:], numbers[:3])))
-        )
-
     @property
     def described_region(self) -> tuple[int, list[float]]:
         """As a CylinderChainGrowthForce has it: 0, 1 or 2 for the box, a cuboid or a sphere, and its numbers."""
@@ -142,10 +146,16 @@ class Nucleation:
     @property
     def centre(self) -> FloatArray:
         """(3,) in nm: of its region, or the origin."""
-        kind, numbers = self.described_region
-        if kind == 0:
-            return np.zeros(3)
-        return np.array(numbers[:3]) if kind == 2 else 0.5 * (np.array(numbers[:3]) + np.array(numbers[3:]))
+        return np.zeros(3) if self.region is None else np.mean(bounds_of(self.region), axis=0)
+
+
+def nucleations_of(filaments: Sequence[Filament]) -> list[tuple[Nucleation, list[int]]]:
+    """Those by which filaments begin, with the numbers of these."""
+    found: dict[int, tuple[Nucleation, list[int]]] = {}
+    for number, own in enumerate(filaments):
+        if own.nucleation is not None:
+            found.setdefault(id(own.nucleation), (own.nucleation, []))[1].append(number)
+    return list(found.values())
 
 
 def require_nucleation(nucleation: Nucleation | None) -> None:

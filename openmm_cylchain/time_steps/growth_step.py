@@ -19,10 +19,11 @@ from ..couplings.walls import as_filament_wall_force
 from ..errors import InputError, TimeStepWarning
 from ..filaments.chain_type import ChainType
 from ..filaments.collection import FilamentCollection
+from ..filaments.end_states import ENDS
 from ..filaments.filament import Filament
 from ..filaments.filament_type import FilamentType
 from ..filaments.growth import segment_of_length
-from ..kinetics.branching import Branching
+from ..kinetics.nucleation import nucleations_of
 from ..units.text import format_time
 from ..units.types import FloatArray, Numbers
 from .coupled_forces import CoupledForces
@@ -95,22 +96,17 @@ def warn_if_growth_is_not_resolved(filaments: FilamentCollection, system: openmm
 
 def refuse_countless_monomers(filaments: Sequence[Filament], step: float, box: FloatArray | None) -> None:
     """Raise InputError if a filament gains and loses more than 100000 monomers in a step, in ps, or so many begin."""
-    first: dict[int, tuple[int, Filament]] = {}
-    for number, own in enumerate(filaments):
-        if own.nucleation is not None:
-            first.setdefault(id(own.nucleation), (number, own))
-    for number, own in first.values():
-        rate = own.nucleation.whole_rate(box)
-        if isinstance(own.nucleation, Branching):
-            rate *= sum(other.growth.longest for other in filaments if other.growth is not None)
+    mothers = sum(own.growth.longest for own in filaments if own.growth is not None)
+    for nucleation, (number, *_) in nucleations_of(filaments):
+        rate = nucleation.whole_rate(box, mothers)
         if step * rate > _MOST_EVENTS:
             raise InputError(
-                f"Of the reserve from filament {number} ({own.type.name}) on, {_PER_SECOND * rate:.3g} would begin per "
-                f"second, which are {step * rate:.3g} in a time step of {format_time(step, 4)}. Check the units of its "
-                "nucleation."
+                f"Of the reserve from filament {number} ({filaments[number].type.name}) on, {_PER_SECOND * rate:.3g} "
+                f"would begin per second, which are {step * rate:.3g} in a time step of {format_time(step, 4)}. Check "
+                "the units of its nucleation."
             )
     for number, filament in enumerate(filaments):
-        rate = sum(_events(filament, end) for end in ("minus", "plus"))
+        rate = sum(_events(filament, end) for end in ENDS)
         severing = None if filament.growth is None else filament.growth.severing
         if filament.growth is not None and severing is not None:
             rate += severing.rate * filament.growth.longest

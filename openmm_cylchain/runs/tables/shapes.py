@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...couplings.shapes import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere
+from ...couplings.shapes import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere, bounds_of, volume_of
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Key, Quantity, direction, point
 from ..table import TableKind
@@ -87,7 +87,7 @@ class Region:
         """In nm^3."""
         if isinstance(self._shape, Cylinder):
             return np.pi * self._shape.radius**2 * self._length
-        return _closed_volume(self._shape)
+        return volume_of(self._shape)
 
     @property
     def diameter(self):
@@ -99,7 +99,7 @@ class Region:
         if isinstance(shape, Cylinder):
             reach = 0.5 * self._length * np.abs(shape.axis) + shape.radius * np.sqrt(1.0 - shape.axis**2)
             return shape.point - reach, shape.point + reach
-        return _closed_bounds(shape)
+        return bounds_of(shape)
 
     def draw(self, generator):
         """A random point in it: a (3,) array in nm."""
@@ -122,18 +122,6 @@ class Region:
         return bool(np.all(inside))
 
 
-def _closed_bounds(shape):
-    if isinstance(shape, Box):
-        return shape.lower, shape.upper
-    reach = shape.semi_axes if isinstance(shape, Ellipsoid) else np.full(3, shape.radius)
-    return shape.center - reach, shape.center + reach
-
-
-def _closed_volume(shape):
-    edges = np.subtract(*_closed_bounds(shape)[::-1])
-    return float(np.prod(edges)) * (1.0 if isinstance(shape, Box) else np.pi / 6.0)
-
-
 def volume_within(shapes, box):
     """The volume in nm^3 that walls of such shapes and a periodic box with three edges leave; None if nobody knows.
 
@@ -145,8 +133,8 @@ def volume_within(shapes, box):
         return None
     (shape,) = shapes
     if isinstance(shape, (Box, Sphere, Ellipsoid)):
-        fits = box is None or np.all(np.subtract(*_closed_bounds(shape)[::-1]) <= box)
-        return _closed_volume(shape) if fits else None
+        fits = box is None or np.all(np.subtract(*bounds_of(shape)[::-1]) <= box)
+        return volume_of(shape) if fits else None
     if box is None or isinstance(shape, Plane):
         return None
     along = np.abs(shape.normal if isinstance(shape, Slab) else shape.axis)
