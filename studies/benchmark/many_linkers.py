@@ -9,22 +9,19 @@ fresh process grows with all linkers than with a hundredth of them, so that cell
 do not count.
 """
 
-import gc
-import json
 import sys
 from dataclasses import dataclass, replace
 
 import numpy as np
-import openmm
 
 from openmm_cylchain import Crosslinks, Filaments
 
 from .kinetic_systems import ACTIN, MILLISECOND, TEMPERATURE, VISCOSITY, BundleSystem
 from .kinetic_systems import linker_types as bundle_types
-from .measurement import Case, Estimate, median, ratio, scaled
-from .memory import MeasurementError, measure_in_process, resident_and_peak
+from .measurement import Estimate, median, ratio, scaled
+from .memory import MeasurementError, measure_in_process, print_growth
 from .report import row
-from .systems import one_thread_context
+from .systems import Network, one_thread_context, restarting
 
 STEP = 2.0
 """In ms."""
@@ -60,16 +57,8 @@ class NetworkSystem:
     steps: int = 300
 
 
-@dataclass(frozen=True)
-class Network:
+class LinkedNetwork(Network):
     """Such filaments in a Context, with linkers, with springs that stay, or alone."""
-
-    filaments: Filaments
-    context: openmm.Context
-
-    def advance(self, steps):
-        """Take steps."""
-        self.context.getIntegrator().step(steps)
 
     def positions(self):
         """Of all nodes, in nm."""
@@ -123,7 +112,7 @@ def create_network(system, linkers=0, springs=None, positions=None):
         links.add_to(openmm_system, periodic=True)
     integrator = filaments.create_integrator(openmm_system, STEP * MILLISECOND, random_seed=_SEED, checks=False)
     nodes = drawn._value if positions is None else positions
-    return Network(filaments, one_thread_context(openmm_system, integrator, nodes))
+    return LinkedNetwork(filaments, one_thread_context(openmm_system, integrator, nodes))
 
 
 def linked_networks(system):
@@ -149,17 +138,7 @@ def linked_networks(system):
 
 def linker_cases(networks):
     """What is timed, a list of Cases that begin from the same state each time."""
-    return [_restarting(_case(name), network) for name, network in networks.items()]
-
-
-def _restarting(name, network):
-    checkpoint = network.context.createCheckpoint()
-
-    def advance(steps):
-        network.context.loadCheckpoint(checkpoint)
-        network.advance(steps)
-
-    return Case(name, advance)
+    return [restarting(_case(name), network) for name, network in networks.items()]
 
 
 def linker_rows(times, joined):
@@ -200,11 +179,12 @@ def bytes_per_linker(system):
 
 
 def _grow(filaments, segments, edge, linkers):
-    before, _ = resident_and_peak()
-    network = create_network(NetworkSystem(int(filaments), int(segments), edge=float(edge)), int(linkers))
-    network.advance(_STEPS)
-    gc.collect()
-    print(json.dumps({"resident": resident_and_peak()[0] - before}))
+    def make():
+        network = create_network(NetworkSystem(int(filaments), int(segments), edge=float(edge)), int(linkers))
+        network.advance(_STEPS)
+        return network
+
+    print_growth(make)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,8 @@ from openmm import app, unit
 from openmm_cylchain import F_ACTIN, Filaments
 from openmm_cylchain.engines.portable_forces import add_bending_forces
 
+from .measurement import Case
+
 TEMPERATURE = 310.0
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 TIME_STEP = 5.0e3
@@ -41,6 +43,32 @@ class Simulated:
     def advance(self, steps):
         """Advance by a number of steps."""
         self.integrator.step(steps)
+
+
+@dataclass(frozen=True)
+class Network:
+    """Filaments in a Context."""
+
+    filaments: Filaments
+    context: openmm.Context
+
+    def advance(self, steps):
+        """Take steps."""
+        self.context.getIntegrator().step(steps)
+
+
+def restarting(name, network, step=None):
+    """A Case of a Network that begins from the same state each time, in steps of a length in ps if one is given."""
+    checkpoint = network.context.createCheckpoint()
+
+    def advance(steps):
+        network.context.loadCheckpoint(checkpoint)
+        if step is not None:
+            # A checkpoint has the step, too.
+            network.context.getIntegrator().setStepSize(step)
+        network.advance(steps)
+
+    return Case(name, advance)
 
 
 def one_thread_platform():

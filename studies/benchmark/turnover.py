@@ -12,14 +12,11 @@ without linkers, which is the mechanics. Free monomers stay as many, so that fil
 from the same state each time that they are timed.
 """
 
-import gc
-import json
 import sys
 import time
 from dataclasses import dataclass, replace
 
 import numpy as np
-import openmm
 from openmm import unit
 
 from openmm_cylchain import (
@@ -36,10 +33,10 @@ from openmm_cylchain import (
 from openmm_cylchain.engine_choice import choose_engine
 
 from .kinetic_systems import MICROSECOND, TEMPERATURE, VISCOSITY
-from .measurement import Case, Estimate, describe_machine, median, ratio, scaled, time_interleaved
-from .memory import MeasurementError, measure_in_process, resident_and_peak
+from .measurement import Estimate, describe_machine, median, ratio, scaled, time_interleaved
+from .memory import MeasurementError, measure_in_process, print_growth
 from .report import Report, Row, row
-from .systems import one_thread_context
+from .systems import Network, one_thread_context, restarting
 
 MONOMERS_OF_SEGMENT = 40
 MONOMERS = replace(ACTIN_ATP, minus_off_rate=6.75 / unit.second)
@@ -108,16 +105,8 @@ FULL = TurnoverEffort(TurnoverSystem(), (100.0, 1000.0), 5e5, 7, 2.0)
 QUICK = TurnoverEffort(TurnoverSystem(), (100.0, 1000.0), 1e5, 3, 0.5)
 
 
-@dataclass(frozen=True)
-class Network:
-    """Filaments in a Context."""
-
-    filaments: Filaments
-    context: openmm.Context
-
-    def advance(self, steps):
-        """Take steps."""
-        self.context.getIntegrator().step(steps)
+class TurnoverNetwork(Network):
+    """Filaments in a Context that may grow."""
 
     def segments(self):
         """How many there are."""
@@ -167,7 +156,7 @@ def create_network(system, step, growing=True, linked=True, births=None):
         filaments.add_linkers(kind, count, bound=count, seed=_SEED)
     _, openmm_system, positions = filaments.build(box_vectors=system.edge * np.eye(3))
     integrator = filaments.create_integrator(openmm_system, step * MICROSECOND, random_seed=_SEED, checks=False)
-    return Network(filaments, one_thread_context(openmm_system, integrator, positions._value))
+    return TurnoverNetwork(filaments, one_thread_context(openmm_system, integrator, positions._value))
 
 
 def benchmark_turnover(effort=FULL, say=lambda message: None):
@@ -202,7 +191,11 @@ def benchmark_turnover(effort=FULL, say=lambda message: None):
         "growth_with_births": create_network(system, longest, linked=False, births=2e6 / longest),
         "mechanics": create_network(system, longest, growing=False, linked=False),
     }
-    cases = [_case(name, own, step) for name, own in networks.items() for step in effort.steps]
+    cases = [
+        restarting(_name(name, step), own, step * MICROSECOND)
+        for name, own in networks.items()
+        for step in effort.steps
+    ]
     times = time_interleaved(cases, effort.repetitions, effort.seconds, say, clock=time.process_time)
     rows = speed_rows(effort.steps, times)
     rows += event_rows(monomers, filaments, times[_name("turnover", longest)], longest)
@@ -232,18 +225,6 @@ def benchmark_turnover(effort=FULL, say=lambda message: None):
 
 def _name(case, step):
     return f"{case}_{step:g}_us"
-
-
-def _case(name, network, step):
-    checkpoint = network.context.createCheckpoint()
-
-    def advance(steps):
-        # A checkpoint has the step, too.
-        network.context.loadCheckpoint(checkpoint)
-        network.context.getIntegrator().setStepSize(step * MICROSECOND)
-        network.advance(steps)
-
-    return Case(_name(name, step), advance)
 
 
 def speed_rows(steps, times):
@@ -298,12 +279,14 @@ def memory_in_process(system):
 
 def _grow(*numbers):
     filaments, reserve, crosslinkers, motors = map(int, numbers)
-    before, _ = resident_and_peak()
-    system = TurnoverSystem(filaments, reserve, crosslinkers=crosslinkers, motors=motors)
-    network = create_network(system, 1000.0)
-    network.advance(_STEPS)
-    gc.collect()
-    print(json.dumps({"resident": resident_and_peak()[0] - before}))
+
+    def make():
+        system = TurnoverSystem(filaments, reserve, crosslinkers=crosslinkers, motors=motors)
+        network = create_network(system, 1000.0)
+        network.advance(_STEPS)
+        return network
+
+    print_growth(make)
 
 
 if __name__ == "__main__":
