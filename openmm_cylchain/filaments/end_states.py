@@ -10,7 +10,7 @@ import numpy as np
 from openmm import unit
 
 from ..errors import InputError
-from ..units.quantities import AVOGADRO, ON_RATE, RATE, in_units_of, non_negative, shown
+from ..units.quantities import AVOGADRO, LENGTH, ON_RATE, RATE, in_units_of, non_negative, positive, shown
 from ..units.types import FloatArray, Scalar
 
 _PER_AMOUNT = unit.liter / unit.mole / unit.second
@@ -51,8 +51,15 @@ class EndStates:
         The state stays as it is if not given.
     names : (n,) sequence of str, optional
         For reports; numbers if not given.
+    blocked_switch_rates : (n, n) sequence of 1/time, optional
+        How much larger switch_rates are while what is in its way lets no monomer come: the rate is ``switch_rates +
+        blocked_switch_rates (1 - s)`` with s the share of the monomers that come, which is that of the speed at which
+        an end grows without loss.
+    switch_lengths : (n,) sequence of length, optional
+        If not zero, the rates from this state to others are those of a filament of this length, and proportional to
+        lengths.
 
-    The attributes hold plain numbers, in nm^3/ps and 1/ps.
+    The attributes hold plain numbers, in nm^3/ps, 1/ps and nm.
 
     Raises
     ------
@@ -67,6 +74,8 @@ class EndStates:
     after_gain: tuple[int, ...] = ()
     after_loss: tuple[int, ...] = ()
     names: tuple[str, ...] = ()
+    blocked_switch_rates: tuple[tuple[float, ...], ...] = ()
+    switch_lengths: tuple[float, ...] = ()
 
     if TYPE_CHECKING:
 
@@ -79,25 +88,28 @@ class EndStates:
             after_gain: Sequence[int] = (),
             after_loss: Sequence[int] = (),
             names: Sequence[str] = (),
+            blocked_switch_rates: Sequence[Sequence[Scalar]] = (),
+            switch_lengths: Sequence[Scalar] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        for name in ("on_rates", "off_rates", "switch_rates", "after_gain", "after_loss", "names"):
+        for name in ("on_rates", "off_rates", "after_gain", "after_loss", "names", "switch_lengths"):
             as_tuple(getattr(self, name), name)
         count = len(self.on_rates)
         if not 1 <= count <= _MOST_STATES:
             raise InputError(f"An end has from 1 to {_MOST_STATES} states, but on_rates has {count} values.")
-        rows = [as_tuple(row, "switch_rates") for row in self.switch_rates]
-        if len(self.off_rates) != count or len(rows) != count or any(len(row) != count for row in rows):
-            raise InputError(
-                f"on_rates has {count} values: off_rates must have as many, and switch_rates {count} x {count}."
-            )
+        lengths = self.switch_lengths or (0.0,) * count
+        if len(self.off_rates) != count or len(lengths) != count:
+            raise InputError(f"on_rates has {count} values: off_rates and switch_lengths must have as many.")
         object.__setattr__(self, "on_rates", tuple(as_on_rate(rate, "on_rates") for rate in self.on_rates))
         object.__setattr__(self, "off_rates", tuple(non_negative(rate, RATE, "off_rates") for rate in self.off_rates))
-        switches = tuple(tuple(non_negative(rate, RATE, "switch_rates") for rate in row) for row in rows)
-        if any(row[state] != 0.0 for state, row in enumerate(switches)):
-            raise InputError("switch_rates must be zero from a state to itself.")
-        object.__setattr__(self, "switch_rates", switches)
+        object.__setattr__(
+            self, "switch_lengths", tuple(non_negative(length, LENGTH, "switch_lengths") for length in lengths)
+        )
+        self._read_switches("switch_rates", count)
+        if not len(as_tuple(self.blocked_switch_rates, "blocked_switch_rates")):
+            object.__setattr__(self, "blocked_switch_rates", ((0.0,) * count,) * count)
+        self._read_switches("blocked_switch_rates", count)
         for name in ("after_gain", "after_loss"):
             after = tuple(getattr(self, name)) or tuple(range(count))
             if len(after) != count or not all(
@@ -110,6 +122,15 @@ class EndStates:
             raise InputError(f"names must have a string of its own for each of {count} states.")
         object.__setattr__(self, "names", names)
 
+    def _read_switches(self, name: str, count: int) -> None:
+        rows = [as_tuple(row, name) for row in as_tuple(getattr(self, name), name)]
+        if len(rows) != count or any(len(row) != count for row in rows):
+            raise InputError(f"on_rates has {count} values: {name} must have {count} x {count}.")
+        switches = tuple(tuple(non_negative(rate, RATE, name) for rate in row) for row in rows)
+        if any(row[state] != 0.0 for state, row in enumerate(switches)):
+            raise InputError(f"{name} must be zero from a state to itself.")
+        object.__setattr__(self, name, switches)
+
     def find(self, name: str) -> int:
         """The number of the state with a name; InputError if there is none."""
         if name not in self.names:
@@ -120,7 +141,10 @@ class EndStates:
         """The mean of what a free end gains, less what it loses, in 1/ps, at a concentration in 1/nm^3.
 
         The mean over the states that it has in the long run, where these do not depend on which monomer comes to light.
+        NaN if they depend on lengths.
         """
+        if any(self.switch_lengths):
+            return float("nan")
         on, off = np.array(self.on_rates) * concentration, np.array(self.off_rates)
         count = len(on)
         leaving = np.array(self.switch_rates)
@@ -137,9 +161,27 @@ class EndStates:
         shares[reached] = np.linalg.lstsq(conditions, np.eye(len(reached) + 1)[-1], rcond=None)[0]
         return float(shares @ (on - off))
 
-    def busiest_rate(self, concentration: float) -> float:
-        """How many events an end has per ps in the state where it has most, at a concentration in 1/nm^3."""
-        switches = np.sum(self.switch_rates, axis=1)
+    def _share_of_rates(self, length: float) -> FloatArray:
+        # By what the rates from each state are to be multiplied, of a filament of a length.
+        lengths = np.array(self.switch_lengths)
+        return np.where(lengths > 0.0, length / np.where(lengths > 0.0, lengths, 1.0), 1.0)
+
+    def require_monomers_for_blocked(self, concentration: float, longest: float) -> None:
+        """InputError if more changes are asked for where growth is blocked than monomers that could not come."""
+        blocked = np.sum(self.blocked_switch_rates, axis=1) * self._share_of_rates(longest)
+        tried = np.array(self.on_rates) * concentration
+        for state in np.flatnonzero(blocked > tried):
+            raise InputError(
+                f"An end that is {self.names[state]} changes by {blocked[state] * 1e12:.3g}/s more where its growth is "
+                f"blocked, but only {tried[state] * 1e12:.3g} monomers/s come to it: that is the most."
+            )
+
+    def busiest_rate(self, concentration: float, longest: float) -> float:
+        """How many events an end has per ps in the state where it has most.
+
+        At a concentration in 1/nm^3, of a filament as long as it can be, in nm.
+        """
+        switches = np.sum(self.switch_rates, axis=1) * self._share_of_rates(longest)
         return float(np.max(np.array(self.on_rates) * concentration + np.array(self.off_rates) + switches))
 
     def most_gained(self, concentration: float) -> float:
@@ -182,19 +224,27 @@ class DynamicInstability:
         How many monomers it loses per time while it shrinks: v-/length of a monomer.
     shrinking_on_rate : volume/time, or 1/(concentration*time)
         k_on while it shrinks.
+    blocked_catastrophe_rate : 1/time, optional
+        That of an end whose growth is blocked. Between, the rate falls with the share of the monomers that come, so
+        that an obstacle brings catastrophes about: f_cat is not changed by it if not given.
+    catastrophe_length : length, optional
+        f_cat is that of a filament of this length, and proportional to lengths, as kinesin-8 makes it.
 
-    The attributes hold plain numbers, in 1/ps and nm^3/ps.
+    The attributes hold plain numbers, in 1/ps, nm^3/ps and nm.
 
     Raises
     ------
     InputError
-        For a rate that is negative or not finite.
+        For a rate that is negative or not finite, a ``blocked_catastrophe_rate`` below the ``catastrophe_rate``, or a
+        length that is not positive.
     """
 
     catastrophe_rate: float
     rescue_rate: float
     shrinking_off_rate: float
     shrinking_on_rate: float = 0.0
+    blocked_catastrophe_rate: float | None = None
+    catastrophe_length: float | None = None
 
     if TYPE_CHECKING:
 
@@ -205,20 +255,34 @@ class DynamicInstability:
             rescue_rate: Scalar,
             shrinking_off_rate: Scalar,
             shrinking_on_rate: Scalar = 0.0,
+            blocked_catastrophe_rate: Scalar | None = None,
+            catastrophe_length: Scalar | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
         for name in ("catastrophe_rate", "rescue_rate", "shrinking_off_rate"):
             object.__setattr__(self, name, non_negative(getattr(self, name), RATE, name))
         object.__setattr__(self, "shrinking_on_rate", as_on_rate(self.shrinking_on_rate, "shrinking_on_rate"))
+        blocked, length = self.blocked_catastrophe_rate, self.catastrophe_length
+        if blocked is not None:
+            blocked = non_negative(blocked, RATE, "blocked_catastrophe_rate")
+            object.__setattr__(self, "blocked_catastrophe_rate", blocked)
+            if blocked < self.catastrophe_rate:
+                raise InputError("blocked_catastrophe_rate must not be below catastrophe_rate, which a free end has.")
+        if length is not None:
+            object.__setattr__(self, "catastrophe_length", positive(length, LENGTH, "catastrophe_length"))
 
     def states(self, on_rate: float, off_rate: float) -> EndStates:
         """Of an end with the rates of its monomers, in nm^3/ps and 1/ps: "growing" and "shrinking"."""
+        blocked = self.blocked_catastrophe_rate
+        more = 0.0 if blocked is None else blocked - self.catastrophe_rate
         return EndStates(
             on_rates=(on_rate, self.shrinking_on_rate),
             off_rates=(off_rate, self.shrinking_off_rate),
             switch_rates=((0.0, self.catastrophe_rate), (self.rescue_rate, 0.0)),
             names=(GROWING, SHRINKING),
+            blocked_switch_rates=((0.0, more), (0.0, 0.0)),
+            switch_lengths=(self.catastrophe_length or 0.0, 0.0),
         )
 
 

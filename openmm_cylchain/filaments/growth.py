@@ -328,6 +328,8 @@ class Growth:
                 self.monomers.states("plus").find(state)
             if self.severing.shrinks:
                 self.states("plus").find(SHRINKING)
+        for end in ENDS:
+            self.states(end).require_monomers_for_blocked(self.pool.concentration, self.longest)
         if self.plus_capped and self.minus_capped and self.severing is None:
             raise InputError("A filament with two capped ends does not grow: leave its growth out.")
 

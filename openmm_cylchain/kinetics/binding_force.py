@@ -148,6 +148,9 @@ def _add_hand(force, hand, filaments, name):
     )
     force.setHandWalking(number, hand.speed, hand.stall_force or 0.0, hand.walks_backward, hand.at_end == "hold")
     force.setHandSiteSpacing(number, hand.site_spacing or 0.0)
+    force.setHandSevering(number, hand.severing_rate)
+    if hand.severing_rate > 0.0 and not any(filaments[i].growth is not None for i in chains):
+        raise InputError(f"Linkers {name!r}: a hand cuts filaments, but binds to none that grow: give them a growth.")
     if hand.filament_end is not None:
         _set_hand_at_end(force, number, hand.filament_end, [filaments[i] for i in chains], name)
     return number

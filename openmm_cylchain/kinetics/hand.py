@@ -76,6 +76,9 @@ class Hand:
         Types of filaments, or their names; all if not given.
     filament_end : HandAtEnd, optional
         What it has to do with an end of filaments that grow.
+    severing_rate : 1/time
+        At which it cuts the filament to which it is bound, which must grow, before the nearest monomer: katanin,
+        gelsolin, a clump of cofilin. New ends are as ``Growth.severing`` says; the hand stays where it was.
 
     Raises
     ------
@@ -97,6 +100,7 @@ class Hand:
     site_spacing: float | None = None
     binds_to: tuple[str, ...] | None = None
     filament_end: HandAtEnd | None = None
+    severing_rate: float = 0.0
 
     if TYPE_CHECKING:  # What may be given; the attributes hold plain numbers.
 
@@ -117,6 +121,7 @@ class Hand:
             site_spacing: Scalar | None = None,
             binds_to: Sequence[ChainType | str] | None = None,
             filament_end: HandAtEnd | None = None,
+            severing_rate: Scalar = 0.0,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -134,6 +139,7 @@ class Hand:
         convert("speed", finite_number, VELOCITY)
         convert("stall_force", positive, FORCE)
         convert("site_spacing", positive, LENGTH)
+        convert("severing_rate", non_negative, RATE)
         true_or_false(self.walks_backward, "Hand: walks_backward")
         if self.strain_share > 1.0:
             raise InputError(f"Hand: strain_share must be between 0 and 1, but is {self.strain_share:g}.")

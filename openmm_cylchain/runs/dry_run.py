@@ -2,6 +2,8 @@
 
 import tempfile
 
+import numpy as np
+
 from ..kinetics.branching import Branching
 from ..output.run_tables import ENERGY_COLUMNS, GROWTH_TABLE_COLUMNS, LINKER_TABLE_COLUMNS
 from ..units.text import format_time
@@ -70,10 +72,10 @@ def _what_is_built(configuration, built):
 def _growth_of(group):
     growth = group.growth
     concentration = growth.pool.concentration / MICROMOLAR
+    rates = {end: free_rate(growth, end, concentration) for end in ENDS if growth.states(end).grows}
     gains = [
-        f"{free_rate(growth, end, concentration):+.3g} monomers/s at the {end} end"
-        for end in ENDS
-        if growth.states(end).grows
+        f"{rate:+.3g} monomers/s at the {end} end" if np.isfinite(rate) else f"as its length says at the {end} end"
+        for end, rate in rates.items()
     ]
     nodes = f"{_counted(group.spare_nodes, 'spare node')} each, for a length of {growth.longest:g} nm"
     return f"{' and '.join(gains)}, where it is free, at {concentration:.4g} uM; {nodes}"

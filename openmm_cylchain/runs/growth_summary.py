@@ -116,7 +116,7 @@ def growing_groups(configuration, members):
 def free_rate(growth, end, concentration):
     """What a free "plus" or "minus" end gains less what it loses, in 1/s, at a concentration in umol/l.
 
-    Of one with several states, the mean over those that it has in the long run.
+    Of one with several states, the mean over those that it has in the long run; NaN if that depends on lengths.
     """
     return growth.states(end).net_rate(concentration * MICROMOLAR) * _SECOND
 
@@ -140,7 +140,8 @@ def _summarise(table, growth, numbers, label, end):
     concentration = float(table.column("free monomers (uM)", numbers).mean())
     # Those that shrink vanish, and are no more to be counted.
     known = not growth.vanishes or len(growth.states(end).names) == 1
-    return EndSummary(label, end, *counts, *rate, free_rate(growth, end, concentration) if known else None)
+    of_free_one = _finite(free_rate(growth, end, concentration)) if known else None
+    return EndSummary(label, end, *counts, *rate, of_free_one)
 
 
 def rate_of_gains(table, end, numbers=None, late=slice(None), sizes=1.0):

@@ -46,7 +46,7 @@ def steady_population(groups, box, concentration):
         return None
     number = length = 0.0
     for own in nucleations:
-        times = _times(ends, concentration, fewest, own.monomers(growth, kind), most)
+        times = _times(ends, concentration, fewest, own.monomers(growth, kind), most, growth.monomers.length)
         if times is None or times[-1] > _MOST_AT_LONGEST * times.sum():
             return None
         # Of no monomers at first, no power but the zeroth begins filaments.
@@ -57,18 +57,21 @@ def steady_population(groups, box, concentration):
     return SteadyPopulation(number, length / number) if number > 0.0 else None
 
 
-def _times(ends, concentration, fewest, first, most):
+def _times(ends, concentration, fewest, first, most, monomer):
     # For how long, in ps, a filament has each number of monomers before it vanishes; None if it may never do.
-    gain, loss, switch = (sum(parts) for parts in zip(*_rates_of_both(ends, concentration)))
+    gain, loss, switch, by_length = (sum(parts) for parts in zip(*_rates_of_both(ends, concentration)))
     sizes, states = most - fewest + 1, len(gain)
     if not loss.any():
         return None
     below_most = np.ones(sizes)
     below_most[-1] = 0.0
     up, down = scipy.sparse.diags([below_most[:-1]], [1]), scipy.sparse.diags([np.ones(sizes - 1)], [-1])
+    lengths = monomer * np.arange(fewest, most + 1)
     rates = scipy.sparse.kron(scipy.sparse.identity(sizes), switch)
+    rates = rates + scipy.sparse.kron(scipy.sparse.diags([lengths], [0]), by_length)
     rates = rates + scipy.sparse.kron(up, gain) + scipy.sparse.kron(down, loss)
     leaving = np.tile((switch + loss).sum(axis=1), sizes) + np.kron(below_most, gain.sum(axis=1))
+    leaving += np.kron(lengths, by_length.sum(axis=1))
     begin = np.zeros(sizes * states)
     begin[(first - fewest) * states] = 1.0
     scale = leaving.max()
@@ -78,12 +81,15 @@ def _times(ends, concentration, fewest, first, most):
 
 
 def _rates_of_both(ends, concentration):
-    # Of each end, among the states of both: by gains, by losses and by themselves, from one row to a column.
+    # Of each end, among the states of both: by gains, by losses, by themselves, and by themselves for each nm of length,
+    # from a row to a column.
     identities = [np.eye(len(own.names)) for own in ends]
     for place, own in enumerate(ends):
         count = np.arange(len(own.names))
         gain, loss = np.zeros((2, len(count), len(count)))
         gain[count, own.after_gain] = np.array(own.on_rates) * concentration
         loss[count, own.after_loss] = own.off_rates
-        both = [gain, loss, np.array(own.switch_rates)]
+        switch, over = np.array(own.switch_rates), np.array(own.switch_lengths)[:, None]
+        by_length = np.divide(switch, over, out=np.zeros_like(switch), where=over > 0.0)
+        both = [gain, loss, np.where(over > 0.0, 0.0, switch), by_length]
         yield [np.kron(one, identities[1]) if place == 0 else np.kron(identities[0], one) for one in both]

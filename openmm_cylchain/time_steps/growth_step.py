@@ -140,5 +140,6 @@ def _events(filament, end):
     # How many come to an end in 1/ps, in the state in which they are most.
     if filament.growth is None:
         return 0.0
-    busiest: float = filament.growth.states(end).busiest_rate(filament.growth.pool.concentration)
+    growth = filament.growth
+    busiest: float = growth.states(end).busiest_rate(growth.pool.concentration, growth.longest)
     return busiest

@@ -69,7 +69,7 @@ bool ChainGrowth::takeTurns(GrowthState& state, const GrowthStep& step, Group& g
         for (int index : group.chains)
             if (state.ranges[index].size() > 0) {
                 ends.listEvents(state, index, events);
-                population.listEvents(state, index, events);
+                population.listEvents(state, index, chains, events);
             }
         for (int nucleator : group.nucleators)
             population.listNucleation(state, nucleator, events);

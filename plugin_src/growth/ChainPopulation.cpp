@@ -26,7 +26,8 @@ void ChainPopulation::listNucleation(const GrowthState& state, int number, vecto
         events.push_back({GrowthEvent::Nucleate, number, rate});
 }
 
-void ChainPopulation::listEvents(const GrowthState& state, int index, vector<GrowthEvent>& events) const {
+void ChainPopulation::listEvents(const GrowthState& state, int index, ChainsInStep& chains,
+        vector<GrowthEvent>& events) const {
     const GrowingChain& own = system.chains[index];
     const int monomers = state.ranges[index].size();
     if (own.vanishes && monomers <= own.leastMonomers) {
@@ -38,6 +39,14 @@ void ChainPopulation::listEvents(const GrowthState& state, int index, vector<Gro
     }
     if (own.severing.rate > 0)
         events.push_back({GrowthEvent::Sever, index, own.severing.rate*(monomers-1)});
+    for (const SeveringHand& hand : chains.getSeveringHands()) {
+        // A hand that is at an end, or where it has cut already, cuts no more.
+        const int monomer = static_cast<int>(round(hand.position/shapes.getMonomerLength(index)));
+        if (hand.chain != own.chain || monomer <= state.ranges[index].first || monomer >= state.ranges[index].last)
+            continue;
+        events.push_back({GrowthEvent::Sever, index, hand.rate});
+        events.back().monomer = monomer;
+    }
 }
 
 int ChainPopulation::apply(GrowthState& state, const GrowthStep& step, const GrowthEvent& event, double time,
@@ -45,7 +54,7 @@ int ChainPopulation::apply(GrowthState& state, const GrowthStep& step, const Gro
     if (event.kind == GrowthEvent::Nucleate)
         return nucleate(state, step, event.index, time, random, chains, changes);
     if (event.kind == GrowthEvent::Sever)
-        return sever(state, step, event.index, time, random, chains, changes);
+        return sever(state, step, event, time, random, chains, changes);
     vanish(state, event.index, random, chains);
     return -1;
 }
@@ -201,15 +210,19 @@ void ChainPopulation::vanish(GrowthState& state, int index, RandomNumbers& rando
     const EndChange change = {system.chains[index].chain, 1, nodes, after, segments, 0, alongBefore, alongAfter, 1};
     if (!chains.isTaken(chains.findChange(change)-findTetherEnergy(index, nodes[0], chains), random))
         return;
-    chains.show(index, after, alongAfter);
-    chains.set(index, after);
     returnMonomers(state, index, range.size());
-    clear(state, index);
+    clear(state, index, chains);
     state.population.vanished++;
 }
 
 /** Let a chain have no monomers any more. */
-void ChainPopulation::clear(GrowthState& state, int index) const {
+void ChainPopulation::clear(GrowthState& state, int index, ChainsInStep& chains) const {
+    const vector<Vec3d> first(1, chains.getNodes(index)[0]);
+    chains.show(index, first, vector<double>(1, shapes.findLengths(index, state.ranges[index])[0]));
+    chains.set(index, first);
+    for (SeveringHand& hand : chains.getSeveringHands())
+        if (hand.chain == system.chains[index].chain)
+            hand.chain = -1;
     state.ranges[index] = {};
     state.monomers[index].clear();
     state.identities[index] = state.parents[index] = -1;
@@ -234,13 +247,17 @@ bool ChainPopulation::mayCut(GrowthState& state, int index, int monomer, double 
     return random.uniform() < own.severing.shares[found];
 }
 
-int ChainPopulation::sever(GrowthState& state, const GrowthStep& step, int index, double time,
+int ChainPopulation::sever(GrowthState& state, const GrowthStep& step, const GrowthEvent& event, double time,
         RandomNumbers& random, ChainsInStep& chains, GrowthChanges& changes) {
+    const int index = event.index;
     const GrowingChain& own = system.chains[index];
     const MonomerRange before = state.ranges[index];
-    const int monomer = before.first+1+min(before.size()-2, static_cast<int>(random.uniform()*(before.size()-1)));
-    if (!mayCut(state, index, monomer, time, random))
-        return -1;
+    int monomer = event.monomer;
+    if (monomer == GrowthEvent::ANY_MONOMER) {
+        monomer = before.first+1+min(before.size()-2, static_cast<int>(random.uniform()*(before.size()-1)));
+        if (!mayCut(state, index, monomer, time, random))
+            return -1;
+    }
     const MonomerRange ranges[] = {{before.first, monomer}, {monomer, before.last}};
     bool stays[2];
     for (int side : {0, 1}) {
@@ -308,9 +325,16 @@ int ChainPopulation::sever(GrowthState& state, const GrowthStep& step, int index
         else
             returnMonomers(state, index, ranges[side].size());
     }
-    setParts(state, index, part, monomer, stays, time, random);
-    if (part != index)
+    if (!stays[0] && !stays[1])
+        clear(state, index, chains);
+    else
+        setParts(state, index, part, monomer, stays, time, random);
+    if (part != index) {
         changes.cuts.push_back({own.chain, system.chains[part].chain, cut});
+        for (SeveringHand& hand : chains.getSeveringHands())
+            if (hand.chain == own.chain && hand.position > cut)
+                hand.chain = system.chains[part].chain;
+    }
     state.population.severed++;
     return part == index ? -1 : part;
 }
@@ -375,8 +399,6 @@ void ChainPopulation::setParts(GrowthState& state, int index, int part, int mono
         state.phases[2*part+1] = state.phases[2*index+1];
         state.phases[2*part] = 0;
     }
-    if (!stays[0] && !stays[1])
-        clear(state, index);
     if (part != index) {
         state.parents[part] = state.identities[index];
         state.identities[part] = state.nextIdentity++;

@@ -21,7 +21,7 @@ public:
     ChainPopulation(const GrowthSystem& system, ChainShapes& shapes) : system(system), shapes(shapes) {
     }
     /** Add what may happen to a chain as a whole. */
-    void listEvents(const GrowthState& state, int index, std::vector<GrowthEvent>& events) const;
+    void listEvents(const GrowthState& state, int index, ChainsInStep& chains, std::vector<GrowthEvent>& events) const;
     /** Add that a nucleator begins a chain. */
     void listNucleation(const GrowthState& state, int nucleator, std::vector<GrowthEvent>& events) const;
     /**
@@ -49,14 +49,14 @@ private:
     double drawAngle(const BranchPlace& branch, double kT, RandomNumbers& random) const;
     long long countMonomers(const Nucleator& nucleator, const GrowthState& state) const;
     void vanish(GrowthState& state, int index, RandomNumbers& random, ChainsInStep& chains);
-    int sever(GrowthState& state, const GrowthStep& step, int index, double time, RandomNumbers& random,
+    int sever(GrowthState& state, const GrowthStep& step, const GrowthEvent& event, double time, RandomNumbers& random,
             ChainsInStep& chains, GrowthChanges& changes);
     CutSide cutSide(int index, int side, double cut, const std::vector<Vec3d>& nodes, const std::vector<double>& along,
             MonomerRange before, MonomerRange range, double kT, RandomNumbers& random) const;
     void setParts(GrowthState& state, int index, int part, int monomer, const bool* stays, double time,
             RandomNumbers& random) const;
     bool mayCut(GrowthState& state, int index, int monomer, double time, RandomNumbers& random) const;
-    void clear(GrowthState& state, int index) const;
+    void clear(GrowthState& state, int index, ChainsInStep& chains) const;
     void returnMonomers(GrowthState& state, int index, long long count) const;
     double findTetherEnergy(int index, const Vec3d& first, const ChainsInStep& chains) const;
     Vec3d drawDirection(int index, RandomNumbers& random) const;

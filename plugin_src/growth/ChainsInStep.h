@@ -19,7 +19,7 @@ public:
     /** @param around  what chains feel */
     ChainsInStep(const GrowthSystem& system, const GrowthStep& step, const ChainList& chains, const double* positions,
             const std::vector<Surroundings*>& around) : system(system), step(step), chains(chains),
-            positions(positions), around(around), present(system.chains.size()) {
+            positions(positions), around(around), present(system.chains.size()), hands(step.severingHands) {
     }
     const Chain& getChain(int index) const {
         return chains.getChain(system.chains[index].chain);
@@ -47,6 +47,10 @@ public:
     void set(int index, const std::vector<Vec3d>& nodes);
     /** Let what is beyond a length along a chain belong to another one, as others see it. */
     void move(int index, int other, double beyond);
+    /** Get the hands that cut. */
+    std::vector<SeveringHand>& getSeveringHands() {
+        return hands;
+    }
     /** Set the chains and the positions that have changed. */
     void finish(const GrowthState& state, ChainList& list, double* all, GrowthChanges& changes) const;
 private:
@@ -61,6 +65,7 @@ private:
     const double* positions;
     const std::vector<Surroundings*>& around;
     std::vector<Present> present;
+    std::vector<SeveringHand> hands;
     /** Whether what is around has taken note of the step. */
     bool aroundIsKnown = false;
 };

@@ -41,8 +41,40 @@ void EndGrowth::listEvents(const GrowthState& state, int index, vector<GrowthEve
             add(GrowthEvent::Lose, losses, 0);
         add(GrowthEvent::Gain, gains, 0);
         for (size_t to = 0; to < now.switchRates.size(); to++)
-            add(GrowthEvent::Switch, now.switchRates[to], to);
+            add(GrowthEvent::Switch, now.switchRates[to]*shareOfRates(state, index, now), to);
     }
+}
+
+/** Find by what rates at which an end changes are to be multiplied. */
+double EndGrowth::shareOfRates(const GrowthState& state, int index, const EndState& now) const {
+    if (now.lengthOfRates == 0)
+        return 1;
+    return state.ranges[index].size()*shapes.getMonomerLength(index)/now.lengthOfRates;
+}
+
+/** Let an end change because a monomer did not come: as often as rates say when none does. */
+void EndGrowth::block(GrowthState& state, const GrowthEvent& event, double time, RandomNumbers& random) const {
+    const EndState& now = system.chains[event.index].ends[event.end].states[state.endStates[2*event.index+event.end]];
+    if (event.kind != GrowthEvent::Gain || now.blockedRates.empty())
+        return;
+    const double share = shareOfRates(state, event.index, now)/event.rate;
+    double chosen = random.uniform();
+    for (size_t to = 0; to < now.blockedRates.size(); to++) {
+        const double own = now.blockedRates[to]*share;
+        if (chosen < own) {
+            GrowthEvent change = event;
+            change.kind = GrowthEvent::Switch;
+            change.to = to;
+            changeState(state, change, time, random);
+            return;
+        }
+        chosen -= own;
+    }
+}
+
+void EndGrowth::changeState(GrowthState& state, const GrowthEvent& event, double time, RandomNumbers& random) const {
+    state.events[2*event.index+event.end].switches[event.to]++;
+    setEndState(state, event, time, random);
 }
 
 /** Let the state of an end be what it is after an event. */
@@ -74,8 +106,7 @@ void EndGrowth::apply(GrowthState& state, const GrowthEvent& event, double time,
     const GrowingChain& own = system.chains[index];
     EndEvents& events = state.events[2*index+end];
     if (event.kind == GrowthEvent::Switch) {
-        events.switches[event.to]++;
-        setEndState(state, event, time, random);
+        changeState(state, event, time, random);
         return;
     }
     const vector<Vec3d>& nodes = chains.getNodes(index);
@@ -97,8 +128,10 @@ void EndGrowth::apply(GrowthState& state, const GrowthEvent& event, double time,
     const EndChange change = {own.chain, end, nodes, carried.nodes, carried.segmentsBefore, carried.segmentsAfter,
             alongBefore, alongAfter, carried.joint};
     const double ofLoad = event.kind == GrowthEvent::Gain ? own.ends[end].timing.energyOfLoad : 0;
-    if (!chains.isTaken(chains.findChange(change)*(ofLoad > 0 ? kT/ofLoad : 1), random))
+    if (!chains.isTaken(chains.findChange(change)*(ofLoad > 0 ? kT/ofLoad : 1), random)) {
+        block(state, event, time, random);
         return;
+    }
     chains.show(index, carried.nodes, alongAfter);
     chains.set(index, carried.nodes);
     state.ranges[index] = range;

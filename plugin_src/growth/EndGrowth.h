@@ -23,6 +23,9 @@ public:
     void apply(GrowthState& state, const GrowthEvent& event, double time, double kT, RandomNumbers& random,
             ChainsInStep& chains);
 private:
+    double shareOfRates(const GrowthState& state, int index, const EndState& now) const;
+    void block(GrowthState& state, const GrowthEvent& event, double time, RandomNumbers& random) const;
+    void changeState(GrowthState& state, const GrowthEvent& event, double time, RandomNumbers& random) const;
     void setEndState(GrowthState& state, const GrowthEvent& event, double time, RandomNumbers& random) const;
     const GrowthSystem& system;
     ChainShapes& shapes;

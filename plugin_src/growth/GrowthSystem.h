@@ -2,6 +2,7 @@
 #define CYLCHAIN_GROWTH_SYSTEM_H_
 
 #include "couplings/CapsuleGeometry.h"
+#include "kinetics/Linkers.h"
 #include "mechanics/ChainList.h"
 #include "mechanics/MonomerTable.h"
 #include <algorithm>
@@ -21,6 +22,13 @@ struct EndState {
     int afterGain = 0, afterLoss = 0;
     /** The rates, in 1/ps, at which it changes to each state. */
     std::vector<double> switchRates;
+    /**
+     * How much larger these are while what is around lets no monomer come, or nothing: as many of the monomers that
+     * do not come let it change. The rate follows the share that comes then, and so the mean speed.
+     */
+    std::vector<double> blockedRates = {};
+    /** The length, in nm, of a chain that has these rates, which are proportional to lengths; zero if they are not. */
+    double lengthOfRates = 0;
 };
 
 /** How monomers come and go. */
@@ -200,6 +208,8 @@ struct GrowthStep {
     /** The three vectors of the periodic box, and whether segments are their shortest images in it. */
     const double* box = nullptr;
     bool takesNearestImages = false;
+    /** Hands that cut. */
+    std::vector<SeveringHand> severingHands = {};
 };
 
 /** A chain that has begun as a branch. */

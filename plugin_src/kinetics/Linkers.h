@@ -19,6 +19,12 @@ struct HandAtEnd {
     int freeState = -1, heldState = -1;
 };
 
+/** A hand that cuts the chain to which it is bound: where it is, and its rate in 1/ps. */
+struct SeveringHand {
+    int chain;
+    double position, rate;
+};
+
 /** An end at which a hand is that changes its state. */
 struct HeldEnd {
     int chain, end, freeState, heldState;
@@ -54,6 +60,8 @@ struct Hand {
     bool holdsAtEnds = false;
     /** If positive, it binds to sites this far apart along filaments, which hold one hand each. */
     double siteSpacing = 0;
+    /** The rate at which it cuts chains that grow where it is bound. */
+    double severingRate = 0;
     HandAtEnd atEnd;
     /** Whether the rate of unbinding depends on what the spring does. */
     bool isLoaded() const {

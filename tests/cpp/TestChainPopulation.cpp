@@ -349,6 +349,43 @@ static void testSevering() {
     checkClose(27, places.mean(), 4*places.error(), 1, "cuts are anywhere");
 }
 
+/** Chains that hands cut, where these are bound; those of which both parts are too short vanish. */
+static void testSeveringHands() {
+    for (bool isShort : {false, true}) {
+        const int number = 1000, last = isShort ? 3 : 61;
+        mt19937_64 generator = generatorOf(6);
+        Growing all;
+        all.system.tables = {makeTable(false)};
+        all.system.pools = {{1, 1e6}};
+        for (int i = 0; i < 2*number; i++) {
+            all.add(WEIGHTS, i < number ? MonomerRange {-7, last} : MonomerRange {}, 9, {}, {}, generator);
+            all.system.chains[i].leastMonomers = 6;
+            all.system.chains[i].vanishes = true;
+        }
+        ChainGrowth growth = all.makeGrowth();
+        // Two on each chain, of which one is at its end.
+        GrowthStep step = {KT, 0.5, 9};
+        for (int i = 0; i < number; i++) {
+            step.severingHands.push_back({i, isShort ? -2*MONOMER : 30*MONOMER+0.3, 1.5});
+            step.severingHands.push_back({i, -7*MONOMER, 1e3});
+        }
+        const long long free = all.state.free[0];
+        const GrowthChanges changes = growth.advance(all.state, step, all.chains, all.x.data(), {});
+        Mean cut;
+        for (int i = 0; i < number; i++) {
+            const MonomerRange& range = all.state.ranges[i];
+            cut.add(range.last != last);
+            check(range.last == last || range.last == (isShort ? 0 : 30), "where a hand cuts");
+            check((range.size() == 0) == all.chains.getChain(i).nodes.empty(), "the nodes of what has vanished");
+        }
+        check(changes.cuts.size() == (isShort ? 0 : static_cast<size_t>(lround(cut.sum))), "all cuts");
+        for (const ChainCut& own : changes.cuts)
+            check(own.along == 30*MONOMER && all.state.ranges[own.part].size() == 31, "the other part");
+        check(all.state.free[0] == free+(isShort ? 10*lround(cut.sum) : 0), "monomers of short parts are free");
+        checkMean(1-exp(-0.75), cut, 0.13, "how many are cut by hands");
+    }
+}
+
 /** The cap of two units, each of which may be hydrolysed: the mean time to the first catastrophe (Brun et al. 2009). */
 static void testCapOfTwoUnits() {
     const double g = 3, h = 0.43;
@@ -486,5 +523,5 @@ static void testStatesOfMonomers() {
 
 int main() {
     return runTests({testNucleation, testPool, testNucleationAtWall, testContactsOfWhole, testSeveringLengths,
-            testSevering, testCapOfTwoUnits, testStatesOfMonomers});
+            testSevering, testSeveringHands, testCapOfTwoUnits, testStatesOfMonomers});
 }

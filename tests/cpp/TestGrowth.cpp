@@ -288,6 +288,38 @@ static void testEnergyOfLoad() {
     check(gained.error() < 0.04*gained.mean(), "too few rods");
 }
 
+/** An end before a wall that turns by itself, and more often the fewer monomers come. */
+static void testBlockedGrowth() {
+    mt19937_64 generator = generatorOf(3);
+    Growing all;
+    all.system.tables = {makeTable(false, 0.0001)};
+    all.system.pools = {{1, 0}};
+    const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
+    // One that has turned, or got a monomer, does nothing any more. The wall lets a share exp(-1) of monomers come. The
+    // rate of turning is 0.2 of a rod of half its length, and grows by 0.35 where nothing comes.
+    for (bool isRegular : {false, true}) {
+        GrowingEnd plus;
+        plus.states = {{1, 0, 2, 0, {0, 0.2, 0}, {0, 0.35, 0}, 10}, {0, 0, 0, 0, {0, 0, 0}}, {0, 0, 0, 0, {0, 0, 0}}};
+        plus.timing = {isRegular, 2*KT};
+        Growing own = all;
+        const int number = 4000;
+        for (int i = 0; i < number; i++)
+            own.add(weights, {0, 10}, 2, {}, plus, generator);
+        EndWalls wall({WallShape::Plane, {20, 0, 0}, {-1, 0, 0}, 0}, KT, Array(number, 0.0));
+        ChainGrowth growth = own.makeGrowth();
+        const double time = 1.5, came = exp(-1.0), turned = 2*0.2+2*0.35*(1-came);
+        own.advance(growth, time, 9, {&wall});
+        Mean found;
+        for (int i = 0; i < number; i++)
+            found.add(own.state.endStates[2*i+1] == 1);
+        // At regular times, a monomer is tried once, at a time of 1.
+        const double until = 1-exp(-2*0.2), after = 1-exp(-2*0.2*0.5), tried = 0.7*(1-came);
+        const double expected = isRegular ? until+(1-until)*(tried+(1-came-tried)*after) :
+                turned/(turned+came)*(1-exp(-(turned+came)*time));
+        checkMean(expected, found, 0.1, "ends that turn where their growth is blocked");
+    }
+}
+
 /** What comes to one chain does not depend on others. */
 static void testOrder() {
     const Weights weights = {BendingModel::KratkyPorod, StretchingModel::Harmonic, false};
@@ -532,5 +564,5 @@ static void testRodInTheWay() {
 
 int main() {
     return runTests({testDivision, testFreeEnds, testRodBeforeWall, testPool, testDynamicInstability, testRegularTimes,
-            testEnergyOfLoad, testOrder, testContacts, testLinks, testRodInTheWay});
+            testEnergyOfLoad, testBlockedGrowth, testOrder, testContacts, testLinks, testRodInTheWay});
 }

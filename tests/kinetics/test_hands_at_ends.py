@@ -1,5 +1,7 @@
 """Hands that bind at the ends of filaments that grow, stay there, and change what these do."""
 
+from dataclasses import replace
+
 import numpy as np
 import openmm
 import pytest
@@ -16,6 +18,7 @@ from openmm_cylchain import (
     InputError,
     MonomerPool,
     Monomers,
+    Severing,
 )
 
 pytest.importorskip("openmm_cylchain.plugin")
@@ -105,8 +108,53 @@ def test_hands_stay_at_ends_that_shrink():
     assert linkers.arc_lengths[bound, 0] == pytest.approx(ends, abs=1e-6)
 
 
+def cutting_context(rate, growth):
+    filaments = Filaments(viscosity=1e-3 * unit.pascal * unit.second, temperature=298.0)
+    for number in range(FILAMENTS):
+        filaments.add_equilibrium(ACTIN, segments=6, seed=number + 1, growth=growth)
+    filaments.add_reserve(ACTIN, FILAMENTS, growth=growth)
+    hands = [
+        Hand(binding_rate=PER_SECOND, reach=10.0, unbinding_rate=0.0, severing_rate=rate * PER_SECOND),
+        Hand(binding_rate=0.0, reach=10.0, unbinding_rate=0.0),
+    ]
+    severers = Crosslinker(hands=hands, stiffness=0.1, rest_length=10.0)
+    filaments.add_linkers(severers, count=FILAMENTS, bound=FILAMENTS, volume=1e9)
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 1 * unit.millisecond, random_seed=3, checks=False)
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
+    context.setPositions(positions)
+    return filaments.in_context(context), integrator
+
+
+def test_hands_cut_filaments_where_they_are_bound():
+    growth = Growth(
+        monomers=Monomers(length=2.7),
+        pool=MonomerPool(0.0),
+        longest=800.0,
+        shortest=10.8,
+        plus_capped=True,
+        minus_capped=True,
+        severing=Severing(rate=0.0),
+    )
+    inside, integrator = cutting_context(7.0, growth)
+    places = inside.linkers().arc_lengths[:, 0]
+    integrator.step(100)
+    linkers, state = inside.linkers(), inside.growth()
+    assert np.all(linkers.arc_lengths[:, 0] == places) and 0.2 < state.severed / FILAMENTS < 0.8
+    expected = 1.0 - np.exp(-0.7)
+    assert abs(state.severed - FILAMENTS * expected) < 4 * np.sqrt(FILAMENTS * expected * (1.0 - expected))
+    parts = np.flatnonzero(state.parents >= 0)
+    assert len(parts) == state.severed
+    # Each cut is at the monomer that is nearest to a hand, and this is on one of both parts.
+    cuts = 2.7 * state.monomers[parts, 0]
+    assert np.all(np.abs(places[:, None] - cuts).min(axis=0) <= 1.35 + 1e-9)
+    ends = 2.7 * state.monomers[linkers.filaments[:, 0]]
+    assert np.all(places >= ends[:, 0] - 1.36) and np.all(places <= ends[:, 1] + 1.36)
+
+
 def test_a_system_keeps_what_hands_do_at_ends():
-    _, _, system, _ = system_with(formin(), states(20.0, 4.0))
+    hand = replace(formin(), severing_rate=PER_SECOND)
+    _, _, system, _ = system_with(hand, states(20.0, 4.0))
     copy = openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(system))
     assert openmm.XmlSerializer.serialize(copy) == openmm.XmlSerializer.serialize(system)
 

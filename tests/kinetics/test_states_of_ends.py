@@ -1,20 +1,29 @@
 """Ends with states: monomers that age, and caps of two units, against theory and a simulation of their own."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import openmm
 import pytest
+import scipy.stats
 from openmm import unit
 
 from openmm_cylchain import (
     F_ACTIN,
+    DynamicInstability,
     EndStates,
     Filaments,
     Growth,
+    InputError,
     MonomerPool,
     Monomers,
     MonomerState,
+    Nucleation,
+    Sphere,
     TwoUnitCap,
 )
+from openmm_cylchain.kinetics.growth_force import find_growth_force
+from openmm_cylchain.runs.steady_populations import steady_population
 
 pytest.importorskip("openmm_cylchain.plugin")
 
@@ -23,6 +32,7 @@ MONOMER, PER_SEGMENT = 2.7, 40
 ACTIN = F_ACTIN.with_segment_length(PER_SEGMENT * MONOMER)
 POOL = MonomerPool(1e-4)
 STEP = 1e7
+FEWEST = 4
 
 
 def contexts_of(growth, count, segments, step=STEP):
@@ -152,3 +162,78 @@ def test_models_of_states():
     mean_within((found.gained - before.gained)[:, 1], 200.0 / 2.75, 0.05)
     mean_within((found.lost - before.lost)[:, 1], 200.0 / 2.75 / 4.0, 0.12)
     assert states.net_rate(POOL.concentration) * STEP == pytest.approx(0.75 / 2.75)
+
+
+def turning(**options):
+    """Ends that gain 40 monomers per step, turn as often as options say, and shrink to nothing at once."""
+    return DynamicInstability(
+        catastrophe_rate=options.pop("rate", 0.4) / STEP, rescue_rate=0.0, shrinking_off_rate=4e4 / STEP, **options
+    )
+
+
+def growing_until_it_turns(instability, longest):
+    monomers = Monomers(length=MONOMER, plus_on_rate=40.0 / STEP / POOL.concentration)
+    return Growth(
+        monomers=monomers,
+        pool=POOL,
+        longest=longest,
+        shortest=FEWEST * MONOMER,
+        plus_instability=instability,
+        minus_capped=True,
+        vanishes=True,
+    )
+
+
+def test_catastrophes_that_come_with_the_length():
+    # With the rate a L at the length L, lengths are distributed as exp(-a L^2/2v) while filaments grow at v: a normal
+    # distribution from the fewest monomers on.
+    growth = growing_until_it_turns(turning(catastrophe_length=100 * MONOMER), longest=700 * MONOMER)
+    nucleation = Nucleation(rate=40.0 / STEP, region=Sphere([0, 0, 0], 500.0))
+    group = SimpleNamespace(type=ACTIN, growth=growth, nucleation=nucleation)
+    expected = steady_population([group], None, POOL.concentration)
+    deviation = np.sqrt(40.0 / 0.004)
+    normal = scipy.stats.norm.pdf(FEWEST / deviation) / scipy.stats.norm.sf(FEWEST / deviation) * deviation
+    assert expected.length / MONOMER == pytest.approx(normal, rel=0.01)
+    filaments = Filaments(WATER, TEMPERATURE)
+    filaments.add_reserve(ACTIN, 250, growth=growth, nucleation=nucleation)
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, STEP, random_seed=3, checks=False)
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName("CPU"), {"Threads": "1"})
+    context.setPositions(positions)
+    integrator.step(20)
+    lengths, numbers = [], []
+    for _ in range(60):
+        integrator.step(8)
+        state = filaments.in_context(context).growth()
+        there = state.nodes > 0
+        numbers.append(there.sum())
+        lengths.append(state.lengths._value[there].mean())
+    assert state.without_place == 0
+    mean_within(lengths, expected.length, 0.06)
+    mean_within(numbers, expected.number, 0.06)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (dict(blocked_catastrophe_rate=0.1 / STEP), "must not be below"),
+        (dict(blocked_catastrophe_rate=60.0 / STEP), "only .* monomers/s come"),
+        (dict(blocked_catastrophe_rate=float("nan")), "blocked_catastrophe_rate"),
+        (dict(catastrophe_length=0.0), "catastrophe_length"),
+    ],
+)
+def test_wrong_catastrophes_are_refused(options, message):
+    with pytest.raises(InputError, match=message):
+        growing_until_it_turns(turning(**options), longest=700 * MONOMER)
+
+
+def test_a_system_keeps_what_rates_of_ends_depend_on():
+    both = turning(catastrophe_length=300.0, blocked_catastrophe_rate=2.0 / STEP)
+    filaments = Filaments(WATER, TEMPERATURE)
+    filaments.add_straight(ACTIN, 3, [0, 0, 0], [1, 0, 0], growth=growing_until_it_turns(both, longest=700 * MONOMER))
+    _, system, _ = filaments.build()
+    text = openmm.XmlSerializer.serialize(system)
+    assert openmm.XmlSerializer.serialize(openmm.XmlSerializer.deserialize(text)) == text
+    force = find_growth_force(openmm.XmlSerializer.deserialize(text))
+    lengths, blocked = force.getEndSwitching(0, 1)
+    assert lengths == (300.0, 0.0) and blocked == pytest.approx((0.0, 1.6 / STEP, 0.0, 0.0))

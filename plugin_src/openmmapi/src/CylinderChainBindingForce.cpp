@@ -280,6 +280,16 @@ void CylinderChainBindingForce::getHandAtEnd(int hand, int& end, double& range, 
     heldState = own.heldState;
 }
 
+double CylinderChainBindingForce::getHandSevering(int hand) const {
+    return getHand(hand).severingRate;
+}
+
+void CylinderChainBindingForce::setHandSevering(int hand, double rate) {
+    if (!(rate >= 0 && rate < HUGE_VAL))
+        throw OpenMMException("CylinderChainBindingForce: A rate of severing cannot be negative and must be finite");
+    handOf(hand).severingRate = rate;
+}
+
 int CylinderChainBindingForce::addBranchJoint(int nucleator, const vector<int>& types,
         const vector<double>& parameters, const vector<double>& places) {
     if (nucleator < 0 || types.empty() || parameters.size() != types.size() || places.size() != types.size())

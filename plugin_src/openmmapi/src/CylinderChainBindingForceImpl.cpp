@@ -262,6 +262,22 @@ void CylinderChainBindingForceImpl::findHeldEnds(vector<cylchain::HeldEnd>& ends
         }
 }
 
+void CylinderChainBindingForceImpl::findSeveringHands(vector<cylchain::SeveringHand>& hands) {
+    if (none_of(system.hands.begin(), system.hands.end(), [] (const cylchain::Hand& hand) {
+        return hand.severingRate > 0;
+    }))
+        return;
+    for (const cylchain::Linker& linker : getState().linkers)
+        for (int side = 0; side < 2; side++) {
+            const cylchain::HandPlace& place = linker.hands[side];
+            if (!place.isBound())
+                continue;
+            const double rate = system.hands[system.types[linker.type].hands[side]].severingRate;
+            if (rate > 0)
+                hands.push_back({place.chain, place.position, rate});
+        }
+}
+
 /** Hold chains that have begun as branches. */
 bool CylinderChainBindingForceImpl::addBranches(const vector<cylchain::ChainBranch>& branches) {
     bool any = false;

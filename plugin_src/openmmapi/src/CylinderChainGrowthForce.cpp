@@ -158,7 +158,7 @@ void CylinderChainGrowthForce::setEndStates(int index, int end, int initialState
     for (size_t i = 0; i < count; i++) {
         vector<double> rates(loads.begin()+i*count, loads.begin()+(i+1)*count);
         requireOfGrowth(rates[i] == 0, "No state can change to itself");
-        own.states.push_back({parameters[2*i], parameters[2*i+1], numbers[2*i], numbers[2*i+1], rates});
+        own.states.push_back({parameters[2*i], parameters[2*i+1], numbers[2*i], numbers[2*i+1], rates, {}, 0});
     }
     chain.ends[end] = move(own);
 }
@@ -176,6 +176,38 @@ void CylinderChainGrowthForce::getEndStates(int index, int end, int& initialStat
         numbers.insert(numbers.end(), {state.afterGain, state.afterLoss});
         loads.insert(loads.end(), state.switchRates.begin(), state.switchRates.end());
         loads.resize(numbers.size()/2*own.states.size(), 0);
+    }
+}
+
+void CylinderChainGrowthForce::setEndSwitching(int index, int end, const vector<double>& lengths,
+        const vector<double>& rates) {
+    requireOfGrowth(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
+    vector<EndState>& states = getOwn(index).ends[end].states;
+    const size_t count = states.size();
+    requireOfGrowth(lengths.size() == count && rates.size() == count*count, "There must be a length for each state of "
+            "an end, and a rate from each to each");
+    for (const vector<double>* values : {&lengths, &rates})
+        requireOfGrowth(all_of(values->begin(), values->end(), isRate),
+                "Lengths and rates of ends cannot be negative and must be finite");
+    for (size_t i = 0; i < count; i++) {
+        requireOfGrowth(rates[i*count+i] == 0, "No state can change to itself");
+        states[i].lengthOfRates = lengths[i];
+        states[i].blockedRates.assign(rates.begin()+i*count, rates.begin()+(i+1)*count);
+        if (all_of(states[i].blockedRates.begin(), states[i].blockedRates.end(), [] (double rate) {return rate == 0;}))
+            states[i].blockedRates.clear();
+    }
+}
+
+void CylinderChainGrowthForce::getEndSwitching(int index, int end, vector<double>& lengths,
+        vector<double>& rates) const {
+    requireOfGrowth(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
+    const vector<EndState>& states = getOwn(index).ends[end].states;
+    lengths.clear();
+    rates.clear();
+    for (const EndState& state : states) {
+        lengths.push_back(state.lengthOfRates);
+        rates.insert(rates.end(), state.blockedRates.begin(), state.blockedRates.end());
+        rates.resize(lengths.size()*states.size(), 0);
     }
 }
 

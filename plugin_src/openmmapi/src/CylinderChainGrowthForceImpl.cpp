@@ -211,6 +211,8 @@ void CylinderChainGrowthForceImpl::updateContextState(ContextImpl& context, bool
         return;
     const CylinderChainIntegrator& integrator = dynamic_cast<const CylinderChainIntegrator&>(context.getIntegrator());
     GrowthStep step = {BOLTZ*integrator.getTemperature(), size, seed};
+    for (CouplingForceImpl* coupling : couplings)
+        coupling->findSeveringHands(step.severingHands);
     vector<Surroundings*> felt;
     felt.reserve(around.size());
     for (const Felt& own : around)

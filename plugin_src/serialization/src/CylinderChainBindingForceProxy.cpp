@@ -20,7 +20,8 @@ static void write(const CylinderChainBindingForce& force, SerializationNode& nod
                 .setDoubleProperty("catchRate", hand.catchRate).setDoubleProperty("catchForce", hand.catchForce)
                 .setDoubleProperty("speed", hand.speed).setDoubleProperty("stallForce", hand.stallForce)
                 .setBoolProperty("walksBackward", hand.walksBackward)
-                .setBoolProperty("holdsAtEnds", hand.holdsAtEnds).setDoubleProperty("siteSpacing", hand.siteSpacing);
+                .setBoolProperty("holdsAtEnds", hand.holdsAtEnds).setDoubleProperty("siteSpacing", hand.siteSpacing)
+                .setDoubleProperty("severingRate", hand.severingRate);
         const cylchain::HandAtEnd& atEnd = hand.atEnd;
         child.setIntProperty("end", atEnd.end).setDoubleProperty("endRange", atEnd.range)
                 .setBoolProperty("bindsAtEnd", atEnd.bindsThere).setBoolProperty("tracksEnd", atEnd.tracks)
@@ -76,6 +77,7 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
                 hand.getBoolProperty("bindsAtEnd"), hand.getBoolProperty("tracksEnd"),
                 hand.getIntProperty("freeState"), hand.getIntProperty("heldState"));
         force->setHandSiteSpacing(number, hand.getDoubleProperty("siteSpacing"));
+        force->setHandSevering(number, hand.getDoubleProperty("severingRate"));
     }
     for (auto& type : node.getChildNode("LinkerTypes").getChildren()) {
         const int number = force->addLinkerType(type.getIntProperty("hand1"), type.getIntProperty("hand2"),

@@ -60,6 +60,10 @@ static void write(const CylinderChainGrowthForce& force, SerializationNode& node
             force.getEndTiming(i, end, isRegular, energyOfLoad);
             columns.put("isRegular", isRegular ? 1 : 0);
             columns.put("energyOfLoad", energyOfLoad);
+            vector<double> lengths, blockedRates;
+            force.getEndSwitching(i, end, lengths, blockedRates);
+            columns.put("lengthsOfRates", lengths);
+            columns.put("blockedRates", blockedRates);
             columns.write(own.createChildNode("End"));
         }
     }
@@ -111,8 +115,10 @@ static unique_ptr<CylinderChainGrowthForce> readGrowthForce(const SerializationN
                 const StateColumns columns = StateColumns::read(child);
                 force->setEndTiming(index, end, columns.getOne<int>("isRegular") != 0,
                         columns.getOne<double>("energyOfLoad"));
-                force->setEndStates(index, end++, columns.getOne<int>("initialState"), columns.get<double>("rates"),
+                force->setEndStates(index, end, columns.getOne<int>("initialState"), columns.get<double>("rates"),
                         columns.get<int>("statesAfter"), columns.get<double>("switchRates"));
+                force->setEndSwitching(index, end++, columns.get<double>("lengthsOfRates"),
+                        columns.get<double>("blockedRates"));
             }
     }
     for (auto& nucleator : node.getChildNode("Nucleators").getChildren()) {

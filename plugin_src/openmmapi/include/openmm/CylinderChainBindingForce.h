@@ -155,6 +155,17 @@ public:
     void getHandAtEnd(int hand, int& end, double& range, bool& bindsThere, bool& tracks, int& freeState,
             int& heldState) const;
     /**
+     * Get the rate at which hands of a kind cut filaments, see setHandSevering().
+     */
+    double getHandSevering(int hand) const;
+    /**
+     * Let hands of a kind cut filaments that grow where they are bound, before the nearest monomer.
+     *
+     * @param hand  the index of the kind
+     * @param rate  how often, measured in 1/ps
+     */
+    void setHandSevering(int hand, double rate);
+    /**
      * Get the distance of binding sites along filaments, measured in nm, or 0 if a kind of hands binds anywhere.
      */
     double getHandSiteSpacing(int hand) const;

@@ -114,6 +114,21 @@ public:
     void getEndStates(int index, int end, int& initialState, std::vector<double>& parameters,
             std::vector<int>& numbers, std::vector<double>& loads) const;
     /**
+     * Set what else the rates depend on at which an end changes its states.
+     *
+     * @param index       the index of the chain among those that grow
+     * @param end         the minus end (0) or the plus end (1)
+     * @param parameters  for each state, the length of a chain, measured in nm, that has the rates from it, which are
+     *                    proportional to lengths; zero if they are not
+     * @param loads       for each state, how much larger the rates to each of them are while what is around lets no
+     *                    monomer come, measured in 1/ps.  They follow the share of the monomers that do.
+     */
+    void setEndSwitching(int index, int end, const std::vector<double>& parameters, const std::vector<double>& loads);
+    /**
+     * Get what else the rates depend on at which an end changes its states, see setEndSwitching().
+     */
+    void getEndSwitching(int index, int end, std::vector<double>& parameters, std::vector<double>& loads) const;
+    /**
      * Set how monomers come and go at an end.
      *
      * @param index      the index of the chain among those that grow

@@ -104,6 +104,11 @@ public:
     virtual void findChangesOfEnds(std::vector<cylchain::HeldEnd>&) const {
     }
     /**
+     * Add its hands that cut chains.
+     */
+    virtual void findSeveringHands(std::vector<cylchain::SeveringHand>&) {
+    }
+    /**
      * Describe it as the ends of chains feel it that grow; NULL if it cannot act on them.
      *
      * @param chains   the chains of the Context
