@@ -152,26 +152,27 @@ def _add_hand(force, hand, filaments, name):
     if hand.severing_rate > 0.0 and not any(filaments[i].growth is not None for i in chains):
         raise InputError(f"Linkers {name!r}: a hand cuts filaments, but binds to none that grow: give them a growth.")
     if hand.filament_end is not None:
-        _set_hand_at_end(force, number, hand.filament_end, [filaments[i] for i in chains], name)
+        _set_hand_at_end(force, number, hand.filament_end, {i: filaments[i] for i in chains}, name)
     return number
 
 
 def _set_hand_at_end(force, number, own, filaments, name):
-    growths = {id(one.growth): one.growth for one in filaments if one.growth is not None}.values()
+    growths = {i: one.growth for i, one in filaments.items() if one.growth is not None}
     if not growths:
         raise InputError(f"Linkers {name!r}: a hand has to do with ends, but binds to no filaments that grow.")
-    states = {(-1, -1)}
+    states, changed = {(-1, -1)}, []
     if own.changes is not None:
-        with_both = [growth.states(own.end) for growth in growths]
-        with_both = [one for one in with_both if set(own.changes) <= set(one.names)]
-        states = {(one.find(own.changes[0]), one.find(own.changes[1])) for one in with_both}
+        names = {i: growth.states(own.end).names for i, growth in growths.items()}
+        changed = [i for i, known in names.items() if set(own.changes) <= set(known)]
+        states = {tuple(map(names[i].index, own.changes)) for i in changed}
         if len(states) != 1:
+            known = " or ".join(dict.fromkeys(", ".join(one) for one in names.values()))
             raise InputError(
                 f"Linkers {name!r}: a hand changes {own.end} ends from {own.changes[0]!r} to {own.changes[1]!r}, which "
-                f"{'no filament has' if not states else 'have different numbers in EndStates of several filaments'}."
+                f"{'no filament has' if not states else 'have different numbers'} among their states {known}."
             )
     ((free, held),) = states
-    force.setHandAtEnd(number, int(own.end == "plus"), own.range, own.binds_there, own.tracks, free, held)
+    force.setHandAtEnd(number, int(own.end == "plus"), own.range, own.binds_there, own.tracks, free, held, changed)
 
 
 def _longest_contour(filament):

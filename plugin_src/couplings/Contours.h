@@ -36,6 +36,10 @@ public:
     double getLength(int chain) const {
         return chains[chain].length;
     }
+    /** Whether there is a position on a chain that is open. */
+    bool isWithin(int chain, double position) const {
+        return chain >= 0 && getLength(chain) > 0 && position >= getBegin(chain) && position <= getEnd(chain, 1);
+    }
     bool isClosed(int chain) const {
         return chains[chain].closed;
     }

@@ -55,7 +55,7 @@ int ChainPopulation::apply(GrowthState& state, const GrowthStep& step, const Gro
         return nucleate(state, step, event.index, time, random, chains, changes);
     if (event.kind == GrowthEvent::Sever)
         return sever(state, step, event, time, random, chains, changes);
-    vanish(state, event.index, random, chains);
+    vanish(state, event.index, random, chains, changes);
     return -1;
 }
 
@@ -132,7 +132,7 @@ bool ChainPopulation::findBranchPlace(const GrowthState& state, const GrowthStep
     const int mother = nucleator.mothers[chosen];
     const vector<double> along = shapes.findLengths(mother, state.ranges[mother]);
     branch = {number, -1, system.chains[mother].chain, along[0]+(monomer+random.uniform())*
-            shapes.getMonomerLength(mother)};
+            shapes.getMonomerLength(mother), 0};
     if (branch.along+nucleator.branch.beyond > along.back())
         return false;
     const vector<Vec3d>& nodes = chains.getNodes(mother);
@@ -153,7 +153,7 @@ bool ChainPopulation::findBranchPlace(const GrowthState& state, const GrowthStep
 int ChainPopulation::nucleate(GrowthState& state, const GrowthStep& step, int number, double time,
         RandomNumbers& random, ChainsInStep& chains, GrowthChanges& changes) {
     const Nucleator& nucleator = system.nucleators[number];
-    ChainBranch branch = {number, -1, -1, 0};
+    ChainBranch branch = {number, -1, -1, 0, 0};
     Vec3d start, direction = nucleator.direction;
     if (!nucleator.mothers.empty()) {
         if (!findBranchPlace(state, step, number, random, chains, branch, start, direction))
@@ -194,12 +194,14 @@ int ChainPopulation::nucleate(GrowthState& state, const GrowthStep& step, int nu
     state.population.nucleated++;
     if (branch.mother >= 0) {
         branch.chain = own.chain;
+        branch.cutsBefore = changes.cuts.size();
         changes.branches.push_back(branch);
     }
     return index;
 }
 
-void ChainPopulation::vanish(GrowthState& state, int index, RandomNumbers& random, ChainsInStep& chains) {
+void ChainPopulation::vanish(GrowthState& state, int index, RandomNumbers& random, ChainsInStep& chains,
+        GrowthChanges& changes) {
     const vector<Vec3d>& nodes = chains.getNodes(index);
     const int segments = nodes.size()-1;
     if (chains.isAnyFixed(index, 0, nodes.size()))
@@ -211,18 +213,16 @@ void ChainPopulation::vanish(GrowthState& state, int index, RandomNumbers& rando
     if (!chains.isTaken(chains.findChange(change)-findTetherEnergy(index, nodes[0], chains), random))
         return;
     returnMonomers(state, index, range.size());
-    clear(state, index, chains);
+    clear(state, index, chains, changes);
     state.population.vanished++;
 }
 
 /** Let a chain have no monomers any more. */
-void ChainPopulation::clear(GrowthState& state, int index, ChainsInStep& chains) const {
+void ChainPopulation::clear(GrowthState& state, int index, ChainsInStep& chains, GrowthChanges& changes) const {
     const vector<Vec3d> first(1, chains.getNodes(index)[0]);
     chains.show(index, first, vector<double>(1, shapes.findLengths(index, state.ranges[index])[0]));
     chains.set(index, first);
-    for (SeveringHand& hand : chains.getSeveringHands())
-        if (hand.chain == system.chains[index].chain)
-            hand.chain = -1;
+    chains.addCut({system.chains[index].chain, -1, -HUGE_VAL}, changes);
     state.ranges[index] = {};
     state.monomers[index].clear();
     state.identities[index] = state.parents[index] = -1;
@@ -326,15 +326,11 @@ int ChainPopulation::sever(GrowthState& state, const GrowthStep& step, const Gro
             returnMonomers(state, index, ranges[side].size());
     }
     if (!stays[0] && !stays[1])
-        clear(state, index, chains);
+        clear(state, index, chains, changes);
     else
         setParts(state, index, part, monomer, stays, time, random);
-    if (part != index) {
-        changes.cuts.push_back({own.chain, system.chains[part].chain, cut});
-        for (SeveringHand& hand : chains.getSeveringHands())
-            if (hand.chain == own.chain && hand.position > cut)
-                hand.chain = system.chains[part].chain;
-    }
+    if (part != index)
+        chains.addCut({own.chain, system.chains[part].chain, cut}, changes);
     state.population.severed++;
     return part == index ? -1 : part;
 }

@@ -48,7 +48,7 @@ private:
     bool isInRegion(const Nucleator& nucleator, const Vec3d& place) const;
     double drawAngle(const BranchPlace& branch, double kT, RandomNumbers& random) const;
     long long countMonomers(const Nucleator& nucleator, const GrowthState& state) const;
-    void vanish(GrowthState& state, int index, RandomNumbers& random, ChainsInStep& chains);
+    void vanish(GrowthState& state, int index, RandomNumbers& random, ChainsInStep& chains, GrowthChanges& changes);
     int sever(GrowthState& state, const GrowthStep& step, const GrowthEvent& event, double time, RandomNumbers& random,
             ChainsInStep& chains, GrowthChanges& changes);
     CutSide cutSide(int index, int side, double cut, const std::vector<Vec3d>& nodes, const std::vector<double>& along,
@@ -56,7 +56,7 @@ private:
     void setParts(GrowthState& state, int index, int part, int monomer, const bool* stays, double time,
             RandomNumbers& random) const;
     bool mayCut(GrowthState& state, int index, int monomer, double time, RandomNumbers& random) const;
-    void clear(GrowthState& state, int index, ChainsInStep& chains) const;
+    void clear(GrowthState& state, int index, ChainsInStep& chains, GrowthChanges& changes) const;
     void returnMonomers(GrowthState& state, int index, long long count) const;
     double findTetherEnergy(int index, const Vec3d& first, const ChainsInStep& chains) const;
     Vec3d drawDirection(int index, RandomNumbers& random) const;

@@ -48,8 +48,14 @@ public:
     /** Let what is beyond a length along a chain belong to another one, as others see it. */
     void move(int index, int other, double beyond);
     /** Get the hands that cut. */
-    std::vector<SeveringHand>& getSeveringHands() {
+    const std::vector<SeveringHand>& getSeveringHands() const {
         return hands;
+    }
+    /** Take note of a cut. */
+    void addCut(const ChainCut& cut, GrowthChanges& changes) {
+        changes.cuts.push_back(cut);
+        for (SeveringHand& hand : hands)
+            followCut(cut, hand);
     }
     /** Set the chains and the positions that have changed. */
     void finish(const GrowthState& state, ChainList& list, double* all, GrowthChanges& changes) const;

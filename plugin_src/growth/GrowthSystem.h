@@ -218,13 +218,15 @@ struct ChainBranch {
     /** Its number and that of its mother among all chains, and where that is along the mother. */
     int chain, mother;
     double along;
+    /** How many cuts there were in the step before. */
+    std::size_t cutsBefore;
 };
 
 /** What a step has changed. */
 struct GrowthChanges {
     /** The growing chains that have changed, by their numbers among these. */
     std::vector<int> chains;
-    /** Where chains were cut, one after the other. */
+    /** Where chains were cut, or have vanished, one after the other. */
     std::vector<ChainCut> cuts;
     std::vector<ChainBranch> branches;
     /** The number of a growing chain the rates of which are too large for the step, or -1. */

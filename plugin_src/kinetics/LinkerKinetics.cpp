@@ -83,6 +83,9 @@ bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& 
     state.events.resize(system.types.size());
     Count count = {vector<LinkerEvents>(system.types.size()), -1};
     bool any = false;
+    vector<char> isCut(contours.getNumChains(), 0);
+    for (const ChainCut& cut : cuts)
+        isCut[cut.chain] = 1;
     for (Linker& linker : state.linkers)
         for (int side = 0; side < 2; side++) {
             HandPlace& place = linker.hands[side];
@@ -92,15 +95,15 @@ bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& 
             const HandAtEnd& atEnd = system.hands[system.types[linker.type].hands[side]].atEnd;
             const bool wasAtEnd = atEnd.tracks && fabs(place.position-before.getEnd(place.chain, atEnd.end)) <=
                     ROUNDING*(1+fabs(place.position));
-            for (const ChainCut& cut : cuts)
-                if (place.chain == cut.chain && place.position > cut.along)
-                    place.chain = cut.part;
-            if (wasAtEnd && contours.getLength(place.chain) > 0)
-                place.position = contours.getEnd(place.chain, atEnd.end);
-            else if (contours.getLength(place.chain) > 0)
-                stayOnChain(linker, side, count);
-            else
+            if (isCut[old.chain] != 0)
+                for (const ChainCut& cut : cuts)
+                    followCut(cut, place);
+            if (!place.isBound() || contours.getLength(place.chain) == 0)
                 unbind(linker, side, nullptr, count);
+            else if (wasAtEnd)
+                place.position = contours.getEnd(place.chain, atEnd.end);
+            else
+                stayOnChain(linker, side, count);
             any = any || place.chain != old.chain || place.position != old.position;
         }
     for (size_t type = 0; type < system.types.size(); type++)

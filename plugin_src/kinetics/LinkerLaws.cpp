@@ -178,9 +178,9 @@ void LinkerKinetics::stayOnChain(Linker& linker, int side, Count& count) const {
             place.position = max(0.0, place.position-length*rounds);
         return;
     }
-    const double begin = contours.getBegin(place.chain), end = contours.getEnd(place.chain, 1);
-    if (place.position >= begin && place.position <= end)
+    if (contours.isWithin(place.chain, place.position))
         return;
+    const double begin = contours.getBegin(place.chain), end = contours.getEnd(place.chain, 1);
     const Hand& hand = system.hands[system.types[linker.type].hands[side]];
     if (hand.holdsAtEnds || (hand.atEnd.tracks && hand.atEnd.end == (place.position > end ? 1 : 0)))
         place.position = min(end, max(begin, place.position));

@@ -2,6 +2,7 @@
 #define CYLCHAIN_LINKERS_H_
 
 #include "couplings/Place.h"
+#include "mechanics/ChainList.h"
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -17,12 +18,8 @@ struct HandAtEnd {
     bool bindsThere = false, tracks = false;
     /** The state that an end changes to while it is there, from another one; -1 if it changes none. */
     int freeState = -1, heldState = -1;
-};
-
-/** A hand that cuts the chain to which it is bound: where it is, and its rate in 1/ps. */
-struct SeveringHand {
-    int chain;
-    double position, rate;
+    /** The chains the ends of which it changes. */
+    std::vector<int> changes = {};
 };
 
 /** An end at which a hand is that changes its state. */
@@ -105,6 +102,18 @@ struct HandPlace {
     bool isBound() const {
         return chain >= 0;
     }
+};
+
+/** Let a place be on the part of a chain that was cut to which it belongs, or on none if that has vanished. */
+template <class AlongChain> void followCut(const ChainCut& cut, AlongChain& place) {
+    if (place.chain == cut.chain && place.position > cut.along)
+        place.chain = cut.part;
+}
+
+/** A hand that cuts the chain to which it is bound: where it is, and its rate in 1/ps. */
+struct SeveringHand {
+    int chain;
+    double position, rate;
 };
 
 /** A linker. */

@@ -11,9 +11,9 @@ namespace cylchain {
 /** What the parts of a chain are. */
 enum class ChainKind : int {StraightSegments, BeamElements};
 
-/** A chain that was cut: what was beyond a length along it belongs to another one. */
+/** A chain that was cut: what was beyond a length along it belongs to another one, or to none if all has vanished. */
 struct ChainCut {
-    /** Their numbers among all chains. */
+    /** Their numbers among all chains, or -1 for none. */
     int chain, part;
     double along;
 };

@@ -415,3 +415,36 @@ def test_memory_stays_as_it_is():
     assert filaments.in_context(context).growth().nucleated - begun > 100000
     assert resident() - before < 4e6 and max(sizes) < 1.2 * min(sizes)
     tracemalloc.stop()
+
+
+@pytest.mark.parametrize("severing", [None, Severing(rate=2e-9)])
+def test_hands_let_go_of_what_vanishes(severing):
+    """Others may take the place of a filament that vanishes, but not what is bound to it."""
+    step = MICROSECOND
+    filaments = Filaments(WATER, TEMPERATURE)
+    nucleation = Nucleation(rate=2.0 / step, region=Sphere([0, 0, 0], 400.0), length=8 * MONOMER)
+    turning = growth(0.3 / step, 0.6 / step, longest=600.0, minus_capped=True, severing=severing)
+    filaments.add_reserve(ACTIN, 60, growth=turning, nucleation=nucleation)
+    hand = Hand(binding_rate=5.0 / step, reach=40.0, unbinding_rate=0.01 / step)
+    filaments.add_linkers(Crosslinker(hands=hand, stiffness=0.1, rest_length=0.0), count=60, volume=1e8)
+    _, system, positions = filaments.build()
+    context = simulate(filaments, system, positions, step)
+    inside, before, followed = filaments.in_context(context), {}, 0
+    for _ in range(300):
+        context.getIntegrator().step(1)
+        state, linkers = inside.growth(), inside.linkers()
+        now = {}
+        for number, side in np.argwhere(linkers.filaments >= 0):
+            slot = linkers.filaments[number, side]
+            known = state.identities[slot], state.parents[slot]
+            now[linkers.numbers[number], side] = (*known, linkers.arc_lengths[number, side])
+        for key in now.keys() & before.keys():
+            if now[key][2] == before[key][2]:
+                # It is on the same filament, or on a part of it.
+                assert before[key][0] in now[key][:2] or severing is not None
+                followed += 1
+        before = now
+    assert followed > 1000 and state.vanished > 100 and (severing is None) == (state.severed == 0)
+    bound = (linkers.filaments >= 0).all(axis=1)
+    places = inside.linker_places()._value[bound]
+    assert np.all(np.linalg.norm(places[:, 0] - places[:, 1], axis=1) < 60.0)

@@ -10,6 +10,7 @@ from openmm import unit
 from openmm_cylchain import (
     F_ACTIN,
     Crosslinker,
+    DynamicInstability,
     EndStates,
     Filaments,
     Growth,
@@ -108,6 +109,48 @@ def test_hands_stay_at_ends_that_shrink():
     assert linkers.arc_lengths[bound, 0] == pytest.approx(ends, abs=1e-6)
 
 
+def test_hands_change_the_ends_to_which_they_bind_and_no_others():
+    instability = DynamicInstability(
+        catastrophe_rate=20 * PER_SECOND, rescue_rate=1 * PER_SECOND, shrinking_off_rate=0 * PER_SECOND
+    )
+    filaments = Filaments(viscosity=1e-3 * unit.pascal * unit.second, temperature=298.0)
+    pool = MonomerPool(1e-6 * unit.molar)
+    for plus, kind in ((states(20.0, 4.0), ACTIN), (instability, replace(ACTIN, name="MT"))):
+        growth = Growth(monomers=Monomers(length=2.7), pool=pool, longest=1200.0, plus_instability=plus)
+        for number in range(FILAMENTS):
+            filaments.add_equilibrium(kind, segments=6, seed=number + 1, growth=growth)
+    other = Hand(binding_rate=0.0, reach=10.0, unbinding_rate=0.0)
+    hands = [replace(formin(), binds_to=[ACTIN.name]), other]
+    filaments.add_linkers(Crosslinker(hands=hands, stiffness=0.1, rest_length=10.0), concentration=1e-9)
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 1 * unit.millisecond, random_seed=3, checks=False)
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
+    context.setPositions(positions)
+    integrator.step(300)
+    growth = filaments.in_context(context).growth()
+    # 20 of 21 shrink in the long run, of 48.
+    assert growth.shrinking[FILAMENTS:, 1].sum() > 38 and not growth.shrinking[:FILAMENTS].any()
+
+
+def test_a_tether_of_a_growing_filament_moves():
+    filaments = Filaments(viscosity=1e-3 * unit.pascal * unit.second, temperature=298.0)
+    monomers = Monomers(length=2.7, plus_on_rate=50 * PER_CONCENTRATION)
+    growth = Growth(monomers=monomers, pool=1e-6 * unit.molar, longest=1200.0, minus_capped=True)
+    filaments.add_straight(ACTIN, 4, [0, 0, 0], [1, 0, 0], growth=growth)
+    filaments.add_tether(0, 0, [0, 0, 0], 50.0)
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 0.2 * unit.millisecond, random_seed=3, checks=False)
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
+    context.setPositions(positions)
+    integrator.step(100)
+    filaments.in_context(context).move_tether(0, [0, 30.0, 0])
+    integrator.step(500)
+    first = context.getState(getPositions=True).getPositions(asNumpy=True)._value[filaments.node_indices[0][0]]
+    # The spring has 0.4 nm of thermal motion.
+    assert np.linalg.norm(first - [0, 30.0, 0]) < 2.0
+    assert filaments.in_context(context).growth().gained[0, 1] > 3
+
+
 def cutting_context(rate, growth):
     filaments = Filaments(viscosity=1e-3 * unit.pascal * unit.second, temperature=298.0)
     for number in range(FILAMENTS):
@@ -136,9 +179,9 @@ def test_hands_cut_filaments_where_they_are_bound():
         minus_capped=True,
         severing=Severing(rate=0.0),
     )
-    inside, integrator = cutting_context(7.0, growth)
+    inside, integrator = cutting_context(35.0, growth)
     places = inside.linkers().arc_lengths[:, 0]
-    integrator.step(100)
+    integrator.step(20)
     linkers, state = inside.linkers(), inside.growth()
     assert np.all(linkers.arc_lengths[:, 0] == places) and 0.2 < state.severed / FILAMENTS < 0.8
     expected = 1.0 - np.exp(-0.7)

@@ -260,17 +260,20 @@ void CylinderChainBindingForce::setLinkers(const vector<int>& numbers, const vec
 }
 
 void CylinderChainBindingForce::setHandAtEnd(int hand, int end, double range, bool bindsThere, bool tracks,
-        int freeState, int heldState) {
+        int freeState, int heldState, const vector<int>& numbers) {
     const bool changes = freeState >= 0 && heldState >= 0;
     if (end < -1 || end > 1 || !(range >= 0 && range < HUGE_VAL) || (end == -1 && (bindsThere || tracks || changes)) ||
-            (freeState >= 0) != (heldState >= 0) || (changes && freeState == heldState))
+            (freeState >= 0) != (heldState >= 0) || (changes && freeState == heldState) ||
+            changes == numbers.empty() || any_of(numbers.begin(), numbers.end(), [] (int chain) {return chain < 0;}))
         throw OpenMMException("CylinderChainBindingForce: A kind of hands needs an end, a range that is not negative, "
-                "and two different states of ends or none");
-    handOf(hand).atEnd = {end, range, bindsThere, tracks, freeState, heldState};
+                "and two different states of ends of some chains or none");
+    handOf(hand).atEnd = {end, range, bindsThere, tracks, freeState, heldState, numbers};
+    vector<int>& chains = handOf(hand).atEnd.changes;
+    sort(chains.begin(), chains.end());
 }
 
 void CylinderChainBindingForce::getHandAtEnd(int hand, int& end, double& range, bool& bindsThere, bool& tracks,
-        int& freeState, int& heldState) const {
+        int& freeState, int& heldState, vector<int>& numbers) const {
     const cylchain::HandAtEnd& own = getHand(hand).atEnd;
     end = own.end;
     range = own.range;
@@ -278,6 +281,7 @@ void CylinderChainBindingForce::getHandAtEnd(int hand, int& end, double& range, 
     tracks = own.tracks;
     freeState = own.freeState;
     heldState = own.heldState;
+    numbers = own.changes;
 }
 
 double CylinderChainBindingForce::getHandSevering(int hand) const {

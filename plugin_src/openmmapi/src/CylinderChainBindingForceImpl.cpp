@@ -238,7 +238,7 @@ void CylinderChainBindingForceImpl::chainsHaveGrown(ContextImpl&, const cylchain
     contours.reset(new cylchain::Contours(chains));
     upToDate = false;
     bool any = linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().setChains(chains, changes.cuts, state);
-    any |= addBranches(changes.branches);
+    any |= addBranches(changes);
     any |= removeBrokenBranches();
     if (any)
         accept();
@@ -246,8 +246,8 @@ void CylinderChainBindingForceImpl::chainsHaveGrown(ContextImpl&, const cylchain
 
 void CylinderChainBindingForceImpl::findChangesOfEnds(vector<cylchain::HeldEnd>& ends) const {
     for (const cylchain::Hand& hand : system.hands)
-        if (hand.atEnd.heldState >= 0)
-            ends.push_back({-1, hand.atEnd.end, hand.atEnd.freeState, hand.atEnd.heldState});
+        for (int chain : hand.atEnd.changes)
+            ends.push_back({chain, hand.atEnd.end, hand.atEnd.freeState, hand.atEnd.heldState});
 }
 
 void CylinderChainBindingForceImpl::findHeldEnds(vector<cylchain::HeldEnd>& ends) {
@@ -257,7 +257,7 @@ void CylinderChainBindingForceImpl::findHeldEnds(vector<cylchain::HeldEnd>& ends
             if (!place.isBound())
                 continue;
             const cylchain::HandAtEnd& own = system.hands[system.types[linker.type].hands[side]].atEnd;
-            if (own.heldState >= 0 && fabs(place.position-contours->getEnd(place.chain, own.end)) <= own.range)
+            if (own.heldState >= 0 && binary_search(own.changes.begin(), own.changes.end(), place.chain) && fabs(place.position-contours->getEnd(place.chain, own.end)) <= own.range)
                 ends.push_back({place.chain, own.end, own.freeState, own.heldState});
         }
 }
@@ -278,20 +278,30 @@ void CylinderChainBindingForceImpl::findSeveringHands(vector<cylchain::SeveringH
         }
 }
 
-/** Hold chains that have begun as branches. */
-bool CylinderChainBindingForceImpl::addBranches(const vector<cylchain::ChainBranch>& branches) {
+/** Hold chains that have begun as branches, where both are still there at the end of the step. */
+bool CylinderChainBindingForceImpl::addBranches(const cylchain::GrowthChanges& changes) {
     bool any = false;
-    for (const cylchain::ChainBranch& branch : branches)
+    for (const cylchain::ChainBranch& branch : changes.branches)
         for (int i = 0; i < owner.getNumBranchJoints(); i++) {
             const cylchain::BranchJoint& joint = owner.getBranchJoint(i);
             if (joint.nucleator != branch.nucleator)
                 continue;
-            for (size_t k = 0; k < joint.types.size(); k++) {
-                cylchain::Linker linker;
+            vector<cylchain::Linker> linkers(joint.types.size());
+            bool areThere = true;
+            for (size_t k = 0; k < linkers.size(); k++) {
+                linkers[k].type = joint.types[k];
+                linkers[k].hands[0] = {branch.mother, branch.along+joint.onMother[k]};
+                linkers[k].hands[1] = {branch.chain, joint.onBranch[k]};
+                for (cylchain::HandPlace& hand : linkers[k].hands) {
+                    for (size_t cut = branch.cutsBefore; cut < changes.cuts.size(); cut++)
+                        followCut(changes.cuts[cut], hand);
+                    areThere = areThere && contours->isWithin(hand.chain, hand.position);
+                }
+            }
+            if (!areThere)
+                continue;
+            for (cylchain::Linker& linker : linkers) {
                 linker.number = state.nextNumber++;
-                linker.type = joint.types[k];
-                linker.hands[0] = {branch.mother, branch.along+joint.onMother[k]};
-                linker.hands[1] = {branch.chain, joint.onBranch[k]};
                 state.linkers.push_back(linker);
                 state.events.resize(system.types.size());
                 state.events[linker.type].bindings += 2;

@@ -2,6 +2,7 @@
 #include "mechanics/BeadModes.h"
 #include "openmm/CylinderChainGrowthForce.h"
 #include "openmm/OpenMMException.h"
+#include <algorithm>
 #include <utility>
 
 using namespace std;
@@ -84,10 +85,13 @@ void CylinderChainDescription::update(const CylinderChainForce& force) {
         throw OpenMMException("updateParametersInContext: The number of chains has changed");
     for (int i = 0; i < present.size(); i++) {
         if (growing.count(i) > 0) {
-            if (!present.getChain(i).tethers.empty())
+            // Its first node is always the same one where it may have a tether.
+            const vector<cylchain::Tether> tethers = present.getChain(i).tethers;
+            if (any_of(tethers.begin(), tethers.end(), [] (const cylchain::Tether& tether) {return tether.node != 0;}))
                 throw OpenMMException("updateParametersInContext: Chain "+to_string(i)+
-                        " grows, and cannot be tethered");
+                        " grows, and can have tethers at its first node alone");
             present.getChain(i) = chains.getChain(i);
+            present.getChain(i).tethers = tethers;
             continue;
         }
         if (present.getKind(i) != chains.getKind(i) || present.getParticles(i) != chains.getParticles(i))

@@ -194,10 +194,12 @@ void CylinderChainGrowthForceImpl::changeEnds() {
         if (now == own.heldState)
             isHeld[2*i+own.end] = 1;
     }
-    for (const HeldEnd& change : changes)
-        for (int i = 0; i < count; i++)
-            if (isOne(i, change) && isHeld[2*i+change.end] == 0 && state.endStates[2*i+change.end] == change.heldState)
-                state.endStates[2*i+change.end] = change.freeState;
+    for (const HeldEnd& change : changes) {
+        const int i = indexOf[change.chain];
+        if (i >= 0 && isOne(i, change) && isHeld[2*i+change.end] == 0 &&
+                state.endStates[2*i+change.end] == change.heldState)
+            state.endStates[2*i+change.end] = change.freeState;
+    }
     accept();
 }
 

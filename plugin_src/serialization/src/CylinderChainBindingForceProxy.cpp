@@ -26,6 +26,8 @@ static void write(const CylinderChainBindingForce& force, SerializationNode& nod
         child.setIntProperty("end", atEnd.end).setDoubleProperty("endRange", atEnd.range)
                 .setBoolProperty("bindsAtEnd", atEnd.bindsThere).setBoolProperty("tracksEnd", atEnd.tracks)
                 .setIntProperty("freeState", atEnd.freeState).setIntProperty("heldState", atEnd.heldState);
+        for (int chain : atEnd.changes)
+            child.createChildNode("ChainWithEnd").setIntProperty("index", chain);
         for (int chain : hand.chains)
             child.createChildNode("Chain").setIntProperty("index", chain);
     }
@@ -63,9 +65,9 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
     force->setRandomNumberSeed(node.getIntProperty("randomSeed"));
     force->setUsesPeriodicBoundaryConditions(node.getBoolProperty("usesPeriodic"));
     for (auto& hand : node.getChildNode("Hands").getChildren()) {
-        vector<int> chains;
+        vector<int> chains, withEnds;
         for (auto& chain : hand.getChildren())
-            chains.push_back(chain.getIntProperty("index"));
+            (chain.getName() == "Chain" ? chains : withEnds).push_back(chain.getIntProperty("index"));
         const int number = force->addHand(hand.getDoubleProperty("bindingRate"), hand.getDoubleProperty("reach"),
                 hand.getDoubleProperty("unbindingRate"), chains);
         force->setHandUnbinding(number, hand.getDoubleProperty("strainShare"),
@@ -75,7 +77,7 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
                 hand.getBoolProperty("walksBackward"), hand.getBoolProperty("holdsAtEnds"));
         force->setHandAtEnd(number, hand.getIntProperty("end"), hand.getDoubleProperty("endRange"),
                 hand.getBoolProperty("bindsAtEnd"), hand.getBoolProperty("tracksEnd"),
-                hand.getIntProperty("freeState"), hand.getIntProperty("heldState"));
+                hand.getIntProperty("freeState"), hand.getIntProperty("heldState"), withEnds);
         force->setHandSiteSpacing(number, hand.getDoubleProperty("siteSpacing"));
         force->setHandSevering(number, hand.getDoubleProperty("severingRate"));
     }

@@ -147,13 +147,15 @@ public:
      * @param tracks      whether one that is at the end stays there while the end grows and shrinks
      * @param freeState   the state of ends that it changes, see CylinderChainGrowthForce::setEndStates(), or -1
      * @param heldState   the state that these have while it is there, or -1
+     * @param numbers     the chains the ends of which it changes
      */
-    void setHandAtEnd(int hand, int end, double range, bool bindsThere, bool tracks, int freeState, int heldState);
+    void setHandAtEnd(int hand, int end, double range, bool bindsThere, bool tracks, int freeState, int heldState,
+            const std::vector<int>& numbers);
     /**
      * Get what a kind of hands has to do with an end, see setHandAtEnd().
      */
     void getHandAtEnd(int hand, int& end, double& range, bool& bindsThere, bool& tracks, int& freeState,
-            int& heldState) const;
+            int& heldState, std::vector<int>& numbers) const;
     /**
      * Get the rate at which hands of a kind cut filaments, see setHandSevering().
      */

@@ -99,7 +99,7 @@ public:
     virtual void findHeldEnds(std::vector<cylchain::HeldEnd>&) {
     }
     /**
-     * Add what it may change ends of chains from and to, with no chain.
+     * Add what it may change ends of chains from and to.
      */
     virtual void findChangesOfEnds(std::vector<cylchain::HeldEnd>&) const {
     }

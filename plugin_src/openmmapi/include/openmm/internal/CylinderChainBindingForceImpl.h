@@ -70,7 +70,7 @@ public:
     StateColumns storeState(bool inCheckpoint);
     void restoreState(const StateColumns& columns);
 private:
-    bool addBranches(const std::vector<cylchain::ChainBranch>& branches);
+    bool addBranches(const cylchain::GrowthChanges& changes);
     bool removeBrokenBranches();
     void follow() const;
     void accept();
