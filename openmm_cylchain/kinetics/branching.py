@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -17,10 +18,12 @@ from ..units.quantities import (
     ENERGY,
     FORCE,
     LENGTH,
+    PICONEWTON,
     RATE,
     STIFFNESS,
     non_negative,
     positive,
+    thermal_energy,
     whole_numbers,
 )
 from ..units.types import Indices, Scalar
@@ -30,6 +33,8 @@ from .linkers import Linkers
 from .nucleation import Nucleation
 
 _PER_LENGTH = RATE / LENGTH
+_MOST_THERMAL_FORCE = 5.0
+"""Of the spring, in debranching forces: more is so seldom what lets go that steps do not see it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,9 +63,11 @@ class Branching(Nucleation):
     distance : length
         From the axis of the mother to the first node: with contacts, that of two axes that touch.
     debranching_rate : 1/time
-        Of the spring at the first node.
+        k of a branch without a load.
     debranching_force : force, optional
-        F_u of its rate k exp(F/F_u) under the load F.
+        F_u of the rate k exp(F/F_u)/m with the force F of the spring at the first node (Bell, Science 1978, 200, 618).
+        m is the ``thermal_factor``, so that the rate without a load is k. With a constant load f it is between
+        k exp(f/F_u), with soft springs, and k sinh(f/F_u)/(f/F_u), with stiff ones whose load has any direction.
     region, length, order
         As of ``Nucleation``; the region is where mothers have branches, which is anywhere if not given.
 
@@ -166,13 +173,45 @@ class Branching(Nucleation):
             springs.append((float(np.hypot(self.distance, self.lever)), self.stiffness, self.lever, 0.0))
         return [*springs, (strut, self.angular_stiffness / self._slope**2, self.lever, self.lever)]
 
-    def linkers(self, name: str) -> list[Linkers]:
+    def thermal_factor(self, temperature: Scalar) -> float:
+        """The mean m of exp(F/F_u) by thermal motion of the spring at the first node, where no load acts on a branch.
+
+        With a = sqrt(k k_BT)/F_u and the normal distribution Phi, it is 2 exp(a^2/2) Phi(a) of a spring whose length is
+        about the ``distance``, if that is some of its thermal lengths sqrt(k_BT/k), and, of one without rest length,
+
+            m = 2 (1 + a^2) exp(a^2/2) Phi(a) + a sqrt(2/pi)
+
+        The strut changes nothing in that: its share of the partition function of straight filaments, summed over the
+        directions of a branch, is proportional to 1/q of the distance q of the first node from where it holds the
+        mother, which has the same mean over all directions of the spring as without the spring.
+
+        Raises
+        ------
+        InputError
+            For springs whose thermal motion has forces sqrt(k k_BT) of more than 5 F_u.
+        """
+        if self.debranching_force is None:
+            return 1.0
+        force = math.sqrt(self.stiffness * thermal_energy(temperature))
+        share = force / self.debranching_force
+        if share > _MOST_THERMAL_FORCE:
+            raise InputError(
+                f"Branching: thermal motion pulls at the spring of a branch with {force / PICONEWTON:.3g} pN, over "
+                f"{_MOST_THERMAL_FORCE:g} times the debranching_force, {self.debranching_force / PICONEWTON:.3g} pN: "
+                "give it a smaller stiffness."
+            )
+        along = math.exp(0.5 * share**2) * (1.0 + math.erf(share / math.sqrt(2.0)))
+        if self.distance > 0.0:
+            return along
+        return (1.0 + share**2) * along + share * math.sqrt(2.0 / math.pi)
+
+    def linkers(self, name: str, temperature: Scalar) -> list[Linkers]:
         """The linkers of its joint, which bind by themselves to nothing: those that branches begin with."""
         still = Hand(binding_rate=0.0, reach=self.lever, unbinding_rate=0.0)
         own = Hand(
             binding_rate=0.0,
             reach=self.lever,
-            unbinding_rate=self.debranching_rate,
+            unbinding_rate=self.debranching_rate / self.thermal_factor(temperature),
             unbinding_force=self.debranching_force,
         )
         joints = []

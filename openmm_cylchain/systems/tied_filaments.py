@@ -270,7 +270,7 @@ class TiedFilaments(AddedFilaments):
     def linkers(self) -> tuple[Linkers, ...]:
         """Tuple of the types of linkers, in the order of their numbers, as they were added, and behind them those of
         the joints of branches."""
-        joints = [own.linkers(f"branch_{number}") for number, own in branchings_of(self._filaments)]
+        joints = [own.linkers(f"branch_{number}", self.temperature) for number, own in branchings_of(self._filaments)]
         return (*self._linkers, *(linkers for joint in joints for linkers in joint))
 
     def _attach(self, attachment):

@@ -145,22 +145,66 @@ def test_joints_let_go_together():
     assert bound[0] > 3 * bound[-1]
 
 
-def test_branches_let_go_under_load_by_the_law_of_bell():
-    """Rates grow by exp(F/F_u) with the force of the spring at the first node, that of thermal motion."""
-    step, rate, force, steps = 1e5, 0.004, 10.0, 120
+@pytest.mark.parametrize("distance", [0.0, 7.0])
+@pytest.mark.parametrize("force", [5.0, 10.0])
+def test_thermal_motion_makes_the_factor_of_rates_of_letting_go(distance, force):
+    """The mean of exp(F/F_u) over joints of straight rods, and that under a load, by Monte Carlo."""
+    branching = Branching(rate=1.0, distance=distance, debranching_rate=1.0, debranching_force=force)
+    generator, count, thermal = np.random.default_rng(5), 1_000_000, np.sqrt(KT / branching.stiffness)
+    springs = branching.springs
+    start = generator.normal(scale=thermal, size=(count, 3))
+    weights = np.ones(count)
+    if distance:
+        # On a ring around the mother, where two springs hold the first node.
+        start *= [1.5, 1.5, 0.0]
+        radii = start[:, 1] + distance
+        weights = radii * np.exp(0.5 * np.sum(start**2, axis=1) / (1.5 * thermal) ** 2)
+        start[:, 1] = radii
+    for rest_length, stiffness, on_mother, _ in springs[:-1] if distance else []:
+        off = np.linalg.norm(start - [on_mother, 0.0, 0.0], axis=1) - rest_length
+        weights *= np.exp(-0.5 * stiffness * off**2 / KT)
+    axis = generator.normal(size=(count, 3))
+    axis *= branching.lever / np.linalg.norm(axis, axis=1)[:, None]
+    rest_length, stiffness, on_mother, _ = springs[-1]
+    off = np.linalg.norm(start + axis - [on_mother, 0.0, 0.0], axis=1) - rest_length
+    weights *= np.exp(-0.5 * stiffness * off**2 / KT)
+    factors = np.exp(branching.stiffness * np.abs(np.linalg.norm(start, axis=1) - distance) / force)
+    mean = np.average(factors, weights=weights)
+    error = np.sqrt(np.sum((weights * (factors - mean)) ** 2)) / weights.sum()
+    factor = branching.thermal_factor(TEMPERATURE)
+    assert error < 0.01 * factor and abs(mean - factor) < 4.0 * error
+    if distance == 0.0:
+        for load in (0.5, 1.0, 3.0):
+            pull = branching.stiffness * start + [load * force, 0.0, 0.0]
+            loaded = np.exp(np.linalg.norm(pull, axis=1) / force).mean() / factor
+            assert 0.98 * np.sinh(load) / load < loaded < 1.02 * np.exp(load)
+
+
+def test_branches_let_go_by_the_law_of_bell():
+    """At k exp(F/F_u)/m with the force of the spring at the first node, which is k on average without a load."""
+    step, rate, force, steps = 1e5, 0.012, 10.0, 120
     options = {"debranching_rate": rate / step, "debranching_force": force}
     filaments, branching, _, context = branched(step, 4, 60, **options)
-    expected, variance, bound = 0.0, 0.0, 0
+    factor = branching.thermal_factor(TEMPERATURE)
+    expected, variance, of_branches = 0.0, 0.0, {}
     for _ in range(steps):
-        rates = rate * np.exp(branching.stiffness * joints_of(filaments, context)[:, 1] / force)
+        found = joints_of(filaments, context)
+        rates = rate * np.exp(branching.stiffness * found[:, 1] / force) / factor
         gone = 1.0 - np.exp(-rates)
-        expected, variance, bound = expected + gone.sum(), variance + (gone * (1.0 - gone)).sum(), bound + len(gone)
+        expected, variance = expected + gone.sum(), variance + (gone * (1.0 - gone)).sum()
+        for branch, own in zip(found[:, 2], rates):
+            of_branches.setdefault(branch, []).append(own)
         context.getIntegrator().step(1)
     state = filaments.in_context(context).growth()
     released = state.nucleated - len(joints_of(filaments, context))
-    # Those that begin and let go in one step are less than a percent.
+    # Those that begin and let go in one step are a percent.
     assert abs(released - expected) < 4.0 * np.sqrt(variance) + 0.01 * expected
-    assert expected > 2.0 * rate * bound and np.sqrt(variance) < 0.1 * expected
+    assert factor > 3.0 and np.sqrt(variance) < 0.1 * expected
+    # Branches that have just begun have springs without forces.
+    sums = np.array([(sum(own[8:]), len(own[8:])) for own in of_branches.values() if len(own) > 8])
+    mean = sums[:, 0].sum() / sums[:, 1].sum()
+    error = np.sqrt(np.sum((sums[:, 0] - mean * sums[:, 1]) ** 2)) / sums[:, 1].sum()
+    assert error < 0.0125 * rate and abs(mean - rate) < 4.0 * error
 
 
 def test_branches_of_mothers_that_shrink():
