@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .attached import add_attached
 from .document import EXACT, NEAREST, Note, point, quantity
 from .grammar import ScriptError
 from .growth import longest_of, read_growth, same_growth
@@ -38,7 +39,7 @@ def add_filaments(translation, new):
     if count == 0:
         return
     lengths = _lengths(fiber, options)
-    growing = _shared_growth(translation, fiber, options)
+    growing = shared_growth(translation, fiber, options)
     for key in ("length", "plus_end", "minus_end", "end_state", "mark"):
         options.values(key)
     shape = _shape(translation, options, lengths[0])
@@ -56,7 +57,8 @@ def add_filaments(translation, new):
             _add_group(translation, fiber, options, length, share, growing, note)
 
 
-def _shared_growth(translation, fiber, options):
+def shared_growth(translation, fiber, options):
+    """The Growing of fibers that are created with options, one for all that share their monomers; None without growth."""
     growing = read_growth(translation, fiber, options)
     if growing is None:
         return None
@@ -69,6 +71,12 @@ def _shared_growth(translation, fiber, options):
         growing.name += "_"
     translation.growings.append(growing)
     return growing
+
+
+def first_length(fiber, options):
+    """The length that fibers are created with, the middle one of a distribution."""
+    lengths = _lengths(fiber, options)
+    return lengths[len(lengths) // 2]
 
 
 def _lengths(fiber, options):
@@ -115,8 +123,8 @@ def _arc(options, length):
     raise ScriptError(options.line_of("shape"), "the shape curved is not known here.")
 
 
-def _segment(translation, fiber, length, growing):
-    # How long a segment is, and how many there are.
+def segment_of(fiber, length, growing):
+    """How long a segment of a fiber is, and how many there are."""
     segmentation = fiber.settings.number("segmentation", default=1.0)
     if not 0.0 < segmentation < math.inf:
         raise fiber.settings.mistake("segmentation", "must be positive.")
@@ -131,7 +139,8 @@ def _segment(translation, fiber, length, growing):
     return own, max(1, round(length / own))
 
 
-def _add_type(translation, table, fiber, segment, length):
+def add_type(translation, table, fiber, segment, length):
+    """Add what a fiber of a length is made of to a table."""
     settings = fiber.settings
     rigidity = settings.number("rigidity")
     if rigidity is None or not 0.0 <= rigidity < math.inf:
@@ -155,12 +164,6 @@ def _add_type(translation, table, fiber, segment, length):
 
 def _add_friction(translation, table, settings, segment, length, radius, diameter):
     # Cytosim has one friction along and across, that of a cylinder on average over all directions.
-    if settings.number("drag_model", "surface_effect", default=0.0) != 0.0:
-        translation.left_out(
-            f"the friction near a surface (drag_model) of {settings.label}",
-            settings.line_of("drag_model"),
-            "surfaces: friction beside one",
-        )
     cutoff = settings.number("drag_length", ("hydrodynamic_radius", 1), default=5.0)
     along = max(min(length, cutoff), radius)
     cylinder = math.log(0.5 * along / radius) + _CORRECTION
@@ -168,6 +171,13 @@ def _add_friction(translation, table, settings, segment, length, radius, diamete
         # The larger one of a cylinder and a sphere.
         sphere = _DRAG * length / (6.0 * radius)
         cylinder = min(cylinder, sphere) if cylinder > 0.0 else sphere
+    if settings.number("drag_model", "surface_effect", default=0.0) != 0.0:
+        gap = settings.number(("drag_model", 1), ("surface_effect", 1), default=0.0)
+        if gap <= 0.0:
+            raise settings.mistake("drag_model", "needs the distance from the surface.")
+        cylinder = 0.5 * _DRAG * math.acosh(1.0 + gap / radius)
+    # A viscosity of its own.
+    cylinder *= translation.viscosity / settings.number("viscosity", default=translation.viscosity)
     at = max(along, segment)
     logarithm = math.log(at / diameter)
     corrections = {"parallel": 2.0 * cylinder / _DRAG - logarithm}
@@ -175,18 +185,15 @@ def _add_friction(translation, table, settings, segment, length, radius, diamete
     table.add("friction_length", quantity(at, "um"), Note(EXACT, "the length of the fiber, or drag_length"))
     note = Note(EXACT, "one friction along and across; delete this line for that of a cylinder")
     table.add("end_corrections", {key: round(value, 9) for key, value in corrections.items()}, note)
-    own = settings.number("viscosity")
-    if own is not None and own != translation.viscosity:
-        translation.left_out(f"the viscosity of {settings.label} alone", settings.line_of("viscosity"), "fiber: viscosity")
 
 
 def _start(translation, fiber, options, length, growing, note=None):
     # A table with all but where its filaments are.
-    segment, segments = _segment(translation, fiber, length, growing)
+    segment, segments = segment_of(fiber, length, growing)
     table = translation.document.table("[[filament]]", options.line)
     if note is not None:
         table.comment(note)
-    _add_type(translation, table, fiber, segment, length)
+    add_type(translation, table, fiber, segment, length)
     if translation.dimensions == 2:
         table.add("planar", True, Note(EXACT, "two dimensions: it stays in the plane z = 0"))
     return table, segment, segments
@@ -196,11 +203,30 @@ def _finish(translation, table, fiber, length, whole, count, growing):
     first = translation.filament_count
     translation.filament_count += count
     translation.made += [Made(fiber.name, first + own, length, growing is not None) for own in range(count)]
+    # In either order: a vector and an end.
+    index = 0 if fiber.settings.text("end_force", default="x")[0] in "+-.0123456789" else 1
+    force, end = fiber.settings.vector("end_force", index), fiber.settings.text(("end_force", 1 - index), default="off")
+    if force is not None and any(force):
+        node = {"plus_end": -1, "minus_end": 0}.get(end)
+        if node is None or growing is not None:
+            line = fiber.settings.line_of("end_force")
+            translation.left_out(f"end_force = {end} of {fiber.name}", line, "forces on ends that grow, or on middles")
+        else:
+            pull = translation.document.table("[[pull]]", table.line)
+            numbers = list(range(first, first + count))
+            pull.add("filament", numbers, Note(EXACT, "end_force", fiber.settings.line_of("end_force")))
+            pull.add("node", node)
+            pull.add("force", [quantity(own, "pN") for own in force])
     if growing is None:
         return
     growing.length += count * length
-    longest, note = longest_of(translation, growing, max(length, whole))
-    inner = translation.document.table("[filament.growth]", table.line)
+    add_growth(translation, "filament", table, fiber, max(length, whole), growing)
+
+
+def add_growth(translation, name, table, fiber, length, growing):
+    """Add the growth of a table of a name, such as filament, whose filaments are of a length at first."""
+    longest, note = longest_of(translation, growing, length)
+    inner = translation.document.table(f"[{name}.growth]", table.line)
     inner.add("monomers", growing.name)
     inner.add("longest", quantity(longest, "um"), note)
     least = fiber.settings.number("min_length", default=0.008)
@@ -222,6 +248,7 @@ def _add_shape(translation, fiber, options, points, growing):
         nodes = _placed(translation, options, nodes)
     table.add("nodes", [point(node) for node in nodes], Note(EXACT, "shape", options.line_of("shape")))
     _finish(translation, table, fiber, length, segment * segments, 1, growing)
+    add_attached(translation, options, 1)
 
 
 def _with_equal_steps(nodes, segment):
@@ -262,6 +289,7 @@ def _add_group(translation, fiber, options, length, count, growing, note=None):
     if not _add_region(translation, table, options, whole, count):
         _add_places(translation, table, options, segment, segments, count, equilibrate > 0.0)
     _finish(translation, table, fiber, length, whole, count, growing)
+    add_attached(translation, options, count)
 
 
 def _read_placement(translation, options):

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .attached import GROWING, PLACED
 from .document import EXACT, LEFT_OUT, NEAREST, Note, point, quantity
 from .hands import read_hand
 from .places import Draw, draw_inside, unknown_position
 from .script import count_of
 
-_DIFFUSION, _PLACED = "linkers that diffuse by themselves", "linkers that begin bound at given places"
-_GROWING, _PAIRS = "links on filaments that grow", "rules for pairs of hands"
+_DIFFUSION, _PAIRS = "linkers that diffuse by themselves", "rules for pairs of hands"
 _MOST_ANCHORS = 50_000
 _RANGE_AND_LAW = (
     "k_on/(2 reach) exp(-U/kT) for each length within reach of a hand that is tied, which has an equilibrium; in Cytosim "
@@ -66,7 +66,7 @@ def _couples(translation, own, new, linked):
     if len(keys) < 2:
         for key in keys:
             if len(options.values(key)) > 1 or translation.find_filament(options.text(key)) is not None:
-                translation.left_out(f"{key} of {new.name}", options.line_of(key), _PLACED)
+                translation.left_out(f"{key} of {new.name}", options.line_of(key), PLACED)
             else:
                 linked.bound += count
         linked.count += count
@@ -74,11 +74,11 @@ def _couples(translation, own, new, linked):
     hands = _hands_of(translation, own)
     places = [_site(translation, options, key) for key in keys]
     if None in places or not all(hand.stays for hand in hands) or own.settings.text("activity") in _COUPLES:
-        translation.left_out(f"where {count} {new.name} are attached", new.line, _PLACED)
+        translation.left_out(f"where {count} {new.name} are attached", new.line, PLACED)
         linked.count += count
         linked.bound += count
     elif any(place["grows"] for place in places):
-        translation.left_out(f"{count} {new.name} that join for ever", new.line, _GROWING)
+        translation.left_out(f"{count} {new.name} that join for ever", new.line, GROWING)
     else:
         for _ in range(count):
             _link(translation, own, new, places[0]["at"], places[1]["at"])
@@ -149,13 +149,13 @@ def _attached(translation, own, new, linked, count, key):
     site = _site(translation, options, key)
     (hand,) = _hands_of(translation, own)
     if site is None or not hand.stays or own.settings.text("activity") != "fixed":
-        translation.left_out(f"where {count} {new.name} are attached", new.line, _PLACED)
+        translation.left_out(f"where {count} {new.name} are attached", new.line, PLACED)
         if own.settings.text("activity") == "fixed":
             linked.points += _points(translation, new, count, len(linked.points))
         else:
             linked.count += count
     elif site["grows"]:
-        translation.left_out(f"{count} {new.name} that hold for ever", new.line, _GROWING)
+        translation.left_out(f"{count} {new.name} that hold for ever", new.line, GROWING)
     else:
         for place in _points(translation, new, count, 0):
             _link(translation, own, new, site["at"], {"point": point(place)})

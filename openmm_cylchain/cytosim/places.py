@@ -166,6 +166,15 @@ def _equator(draw, numbers, _):
     return _flat(draw, np.array([radius * np.cos(angle), radius * np.sin(angle), thickness * draw.half()[0]]))
 
 
+def _stripe(draw, numbers, _):
+    first, last = (*numbers, 0.5)[:2] if numbers else (-0.5, 0.5)
+    if draw.space is None:
+        raise draw.mistake("a stripe needs a space.")
+    place = draw.space.middle + draw.space.half * draw.generator.uniform(-1.0, 1.0, 3)
+    place[0] = draw.generator.uniform(min(first, last), max(first, last))
+    return place
+
+
 def _within_plane(draw, numbers, letters):
     place = draw.inside()
     (axis,) = set(range(3)) - {"XYZ".index(letter) for letter in letters}
@@ -208,10 +217,11 @@ _PRIMITIVES = {
     "ring": _ring,
     "sphere": _shell,
     "square": _square,
+    "stripe": _stripe,
     "XY": _within_plane,
     "XZ": _within_plane,
     "YZ": _within_plane,
-    "gradient": _along_x(lambda x, first, last: (x - first) / (last - first) if first <= x <= last else 0.0),
+    "gradient": _along_x(lambda x, first, last: (x - first) / (last - first) if first != last and min(first, last) <= x <= max(first, last) else 0.0),
     "exponential": _along_x(lambda x, first, scale: math.exp((first - x) / scale) if x >= first else 0.0),
 }
 _WITH_AXIS = {"cylinder": "X", "disc": "Z", "circle": "Z", "ring": "X"}

@@ -34,6 +34,18 @@ _BODIES = {
     "organizer": "bodies: organizers",
     "field": "fields",
 }
+_NEEDS = {
+    **dict.fromkeys(
+        [("fiber", key) for key in ("density", "density_unit", "density_cut_fiber", "density_flux_speed")]
+        + [("fiber", f"density_{key}") for key in ("binding_rate", "unbinding_rate", "aging_rate", "aging", "aging_limit")],
+        "densities along filaments",
+    ),
+    **dict.fromkeys([("fiber", key) for key in ("confine2", "squeeze", "zone_radius")], "walls: several, or of their own laws"),
+    ("fiber", "field"): "fields",
+    ("fiber", "glue"): "surfaces: glue",
+    ("run", "event"): "events during a run",
+}
+"""What keys need that nothing here asks for, by the kind of what has them."""
 _WITH_EVERY_LENGTH = ("rectangle", "square", "periodic", "strip", "semi_periodic", "ellipse", "dice")
 _SEED = 1
 
@@ -50,6 +62,7 @@ class Translation:
         self.generator = np.random.default_rng(_SEED)
         self.thermal_energy = thermal_energy(script.simul)
         self.viscosity = script.simul.number("viscosity", default=1.0)
+        self.nucleated = []
         self.growings, self.made, self.filament_count, self.start_files = [], [], 0, {}
         self._spaces, self._type_names = {}, {}
         self.dimensions = self._find_dimensions(dimensions)
@@ -86,7 +99,7 @@ class Translation:
 
     def fibers_made(self):
         """Properties of the fibers that are there."""
-        names = dict.fromkeys([*(own.name for own in self.made), *self._type_names])
+        names = dict.fromkeys([*(own.name for own in self.made), *self.nucleated])
         return [self.script.properties[name] for name in names]
 
     def find_filament(self, text):
@@ -167,7 +180,7 @@ class Translation:
         add_contacts(self)
         add_walls(self)
         add_simulation(self)
-        self._note_unused([new.settings for new in self.script.created])
+        self._note_unused()
 
     def _add_spaces(self):
         for new in self.script.created:
@@ -182,16 +195,24 @@ class Translation:
                 new.settings.take_rest()
                 self.left_out(f"the space {new.name} of the shape {shape}", new.line, f"spaces: {shape}")
 
-    def _note_unused(self, options):
-        every = [(own.settings, own.kind) for own in self.script.properties.values() if own.kind not in _BODIES]
+    def _note_unused(self):
+        made = [own.name for own in self.fibers_made()]
+        every = []
+        for own in self.script.properties.values():
+            if own.kind not in _BODIES and (own.kind != "fiber" or own.name in made):
+                every.append((own.settings, own.kind))
         every += [(new.settings, f"new {new.kind}") for new in self.script.created]
         every += [(self.script.simul, "simul")]
         if self.script.run is not None:
             every.append((self.script.run, "run"))
         for settings, kind in every:
-            for key, values, line in settings.unused():
-                text = f"{key} = {', '.join(values)}"[:80]
-                self.left_out(f"{text} of {settings.label}", line, f"{kind}: {key}")
+            self.note_unused(settings, kind)
+
+    def note_unused(self, settings, kind):
+        """Note keys of Settings that nothing here has asked for."""
+        for key, values, line in settings.unused():
+            text = f"{key} = {', '.join(values)}"[:80]
+            self.left_out(f"{text} of {settings.label}", line, _NEEDS.get((kind, key), f"{kind}: {key}"))
 
     def check(self):
         """Raise InputError if there is nothing that a run has."""
