@@ -31,7 +31,12 @@ def _holds(translation, own):
     settings = own.settings
     hand = read_hand(translation, settings.text("hand", default=""), own.line)
     length = settings.number("length", default=0.0)
-    return settings.text("activity") == "fixed" and hand.stays and length == 0.0 and settings.number("stiffness", default=0.0) > 0.0
+    return (
+        settings.text("activity") == "fixed"
+        and hand.stays
+        and length == 0.0
+        and settings.number("stiffness", default=0.0) > 0.0
+    )
 
 
 def _add_tether(translation, own, options, key, node, count):

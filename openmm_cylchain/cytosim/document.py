@@ -4,6 +4,7 @@ import json
 from dataclasses import dataclass, field
 
 EXACT, NEAREST, LEFT_OUT = "exact", "nearest", "left out"
+_IN_ONE_LINE = 3
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,7 @@ class Note:
 
     def __str__(self):
         where = "" if self.line is None else f" (line {self.line})"
-        return f"{self.kind}: {self.text}{where}"
+        return f"{self.kind}{': ' if self.text else ''}{self.text}{where}"
 
 
 @dataclass
@@ -109,6 +110,8 @@ def _toml(value):
         return str(value).lower()
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, (list, tuple)) and len(value) > _IN_ONE_LINE and isinstance(value[0], (list, tuple)):
+        return "[\n" + "".join(f"    {_toml(own)},\n" for own in value) + "]"
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(map(_toml, value))}]"
     if isinstance(value, dict):

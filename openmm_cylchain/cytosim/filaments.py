@@ -9,7 +9,16 @@ from .attached import add_attached
 from .document import EXACT, NEAREST, Note, point, quantity
 from .grammar import ScriptError
 from .growth import longest_of, read_growth, same_growth
-from .places import Draw, UnknownDirection, draw_direction, draw_inside, fixed_direction, frame_of, region_of, unknown_position
+from .places import (
+    Draw,
+    UnknownDirectionError,
+    draw_direction,
+    draw_inside,
+    fixed_direction,
+    frame_of,
+    region_of,
+    unknown_position,
+)
 from .script import count_of
 
 _DRAG = 3.0
@@ -18,6 +27,9 @@ _CORRECTION = 0.32
 _LEAST_SHARE, _TRIALS = 0.05, 400
 _LENGTHS = 9
 """How many lengths stand for a distribution of them."""
+_RANGES = ("range", "position_range", "positions", "position_ends", "translation")
+_PLACEMENT = ("orientation", "direction", "position", "reference", "placement", *_RANGES)
+_OFF_PLACE = ("off", "outside", "surface")
 _MOST_SEGMENTS = 5_000_000
 
 
@@ -58,7 +70,7 @@ def add_filaments(translation, new):
 
 
 def shared_growth(translation, fiber, options):
-    """The Growing of fibers that are created with options, one for all that share their monomers; None without growth."""
+    """The Growing of fibers that are created with options, one for all that share monomers; None without growth."""
     growing = read_growth(translation, fiber, options)
     if growing is None:
         return None
@@ -128,6 +140,8 @@ def segment_of(fiber, length, growing):
     segmentation = fiber.settings.number("segmentation", default=1.0)
     if not 0.0 < segmentation < math.inf:
         raise fiber.settings.mistake("segmentation", "must be positive.")
+    if length / segmentation > _MOST_SEGMENTS:
+        raise fiber.settings.mistake("segmentation", f"makes {length / segmentation:.3g} segments of a fiber.")
     if growing is None:
         # Of the number of points that Cytosim has.
         ratio = length / segmentation
@@ -293,7 +307,7 @@ def _add_group(translation, fiber, options, length, count, growing, note=None):
 
 
 def _read_placement(translation, options):
-    for key in ("orientation", "direction", "position", "position_range", "range", "reference", "placement", "positions"):
+    for key in _PLACEMENT:
         options.values(key)
     word = unknown_position(options.text("position", default="inside"))
     if word is not None:
@@ -307,7 +321,7 @@ def _read_placement(translation, options):
     for key in ("direction", "orientation"):
         try:
             draw_direction(options.text(key), np.array([0.3, 0.2, 0.0]), draw)
-        except UnknownDirection:
+        except UnknownDirectionError:
             text = f"{key} = {options.text(key)}, for which they have any"
             translation.left_out(text, options.line_of(key), f"directions: {options.text(key).split()[0]}")
             options.set(key, ["random"], options.line_of(key))
@@ -322,9 +336,9 @@ def _add_region(translation, table, options, whole, count):
     # A count of filaments in a region, where that is about what Cytosim does; whether it is.
     if count == 1 and "position" in options:
         return False
-    if options.text("reference", default="center") != "center" or options.text("placement") in ("off", "outside", "surface"):
+    if options.text("reference", default="center") != "center" or options.text("placement") in _OFF_PLACE:
         return False
-    if any(key in options for key in ("range", "position_range", "positions", "position_ends", "translation")):
+    if any(key in options for key in _RANGES):
         return False
     direction = options.text("direction", "orientation")
     fixed = fixed_direction(direction) if direction else None

@@ -1,14 +1,14 @@
 """Growth of fibers: activities grow, treadmill, classic and dynamic as [[monomers]] and growth of [[filament]].
 
 Laws of Cytosim are in ``doc/sim/fiber_dynamics.md`` and ``src/sim/fibers``. An end that grows has there the speed
-``growing_speed * free * exp(-load/growing_force) + growing_off_speed``, with the share ``free`` of the polymer that is in
-no fiber; here, monomers of the length delta come at the rate k_on c and go at k_off.
+``growing_speed * free * exp(-load/growing_force) + growing_off_speed``, with the share ``free`` of the polymer that is
+in no fiber; here, monomers of the length delta come at the rate k_on c and go at k_off.
 """
 
 import math
 from dataclasses import dataclass, field
 
-from .document import EXACT, LEFT_OUT, NEAREST, Note, quantity
+from .document import EXACT, NEAREST, Note, quantity
 
 _STATES = {"white": 0, "green": 1, "yellow": 2, "orange": 3, "red": 4, "static": 0}
 _STATES |= {"grow": 1, "growing": 1, "shrink": 4, "shrinking": 4}
@@ -28,8 +28,8 @@ _MOST_LENGTH, _MANY_CATASTROPHES = 200.0, 20.0
 class Growing:
     """How fibers of one property with the same states of their ends grow.
 
-    ``entries`` are (key, value, Note) of the growth table, ``rates`` those of the monomers, ``monomer`` the length of one
-    in um, ``speed`` that of an end in um/s, and ``lengths`` those of fibers at first.
+    ``entries`` are (key, value, Note) of the growth table, ``rates`` those of monomers, ``monomer`` is the length of
+    one in um, ``speed`` that of an end in um/s, ``turns`` how often it turns in 1/s, and ``length`` that of all fibers.
     """
 
     name: str
@@ -62,7 +62,9 @@ def read_growth(translation, fiber, options):
     if activity in ("none", "fiber", ""):
         return None
     if activity not in _LAWS:
-        translation.left_out(f"activity = {activity} of {settings.label}", settings.line_of("activity"), "growth: " + activity)
+        translation.left_out(
+            f"activity = {activity} of {settings.label}", settings.line_of("activity"), "growth: " + activity
+        )
         return None
     rebirth = settings.number("rebirth_rate", default=0.0) > 0.0
     if all(state == _STILL for state in states.values()) and not rebirth:
@@ -146,9 +148,7 @@ def _turning(translation, growing, states, key):
             f"{growing.name}: catastrophes of the minus end", settings.line_of(key), "growth: minus ends that turn"
         )
     if states["minus"] == _SHRINKING and settings.number(("rescue_rate", 1), default=0.0) > 0.0:
-        translation.left_out(
-            f"{growing.name}: rescues of the minus end", settings.line, "growth: minus ends that turn"
-        )
+        translation.left_out(f"{growing.name}: rescues of the minus end", settings.line, "growth: minus ends that turn")
     _simple(translation, growing, states, "minus")
 
 
@@ -238,6 +238,3 @@ def add_monomers(translation, growings):
 def same_growth(one, other):
     """Whether two Growings share their monomers."""
     return one.settings is other.settings and one.rates == other.rates and one.monomer == other.monomer
-
-
-__all__ = ["LEFT_OUT", "Growing", "add_monomers", "longest_of", "read_growth", "same_growth", "state_of"]

@@ -14,8 +14,8 @@ from .script import count_of
 _DIFFUSION, _PAIRS = "linkers that diffuse by themselves", "rules for pairs of hands"
 _MOST_ANCHORS = 50_000
 _RANGE_AND_LAW = (
-    "k_on/(2 reach) exp(-U/kT) for each length within reach of a hand that is tied, which has an equilibrium; in Cytosim "
-    "it is k_on wherever a fiber is within reach, however strained"
+    "k_on/(2 reach) exp(-U/kT) for each length within reach of a hand that is tied, which has an equilibrium; in "
+    "Cytosim it is k_on wherever a fiber is within reach, however strained"
 )
 _COUPLES = {
     "fork": "links that hold an angle (fork)",
@@ -123,7 +123,16 @@ def _stiffness(translation, own):
 
 
 def _read_rest(settings):
-    for key in ("diffusion", "fast_diffusion", "min_loop", "stiff", "activity", "confine", "confine_spec", "specificity"):
+    for key in (
+        "diffusion",
+        "fast_diffusion",
+        "min_loop",
+        "stiff",
+        "activity",
+        "confine",
+        "confine_spec",
+        "specificity",
+    ):
         settings.values(key)
 
 
@@ -164,7 +173,9 @@ def _attached(translation, own, new, linked, count, key):
 def _points(translation, new, count, before):
     if before + count > _MOST_ANCHORS:
         translation.left_out(
-            f"{before + count - _MOST_ANCHORS} of {before + count} anchors", new.line, f"more than {_MOST_ANCHORS} anchors"
+            f"{before + count - _MOST_ANCHORS} of {before + count} anchors",
+            new.line,
+            f"more than {_MOST_ANCHORS} anchors",
         )
         count = _MOST_ANCHORS - before
     options = new.settings
@@ -255,7 +266,9 @@ def _add_spring(translation, table, own):
     table.add("stiffness", quantity(_stiffness(translation, own), "pN/um"), Note(EXACT, ""))
     length = own.settings.number("length", default=0.0)
     if length > 0.0:
-        table.add("rest_length", quantity(length, "um"), Note(NEAREST, "a spring in any direction; Cytosim's is across"))
+        table.add(
+            "rest_length", quantity(length, "um"), Note(NEAREST, "a spring in any direction; Cytosim's is across")
+        )
 
 
 def _add_count(translation, table, own, linked, hand):

@@ -70,9 +70,15 @@ def _begins(translation, new, command, rate):
     if fixed is not None and not fixed[1]:
         table.add("direction", [float(own) for own in fixed[0]], Note(EXACT, "", options.line_of("direction")))
     elif direction not in (None, "random"):
-        translation.left_out(f"direction = {direction}", options.line_of("direction"), f"directions: {direction.split()[0]}")
+        translation.left_out(
+            f"direction = {direction}", options.line_of("direction"), f"directions: {direction.split()[0]}"
+        )
     add_type(translation, table, fiber, segment, length)
-    table.add("length", quantity(max(2, round(length / growing.monomer)) * growing.monomer, "um"), Note(EXACT, "", command.line))
+    table.add(
+        "length",
+        quantity(max(2, round(length / growing.monomer)) * growing.monomer, "um"),
+        Note(EXACT, "", command.line),
+    )
     add_growth(translation, "nucleation", table, fiber, length, growing)
     for key in ("reference", "placement", "plus_end", "minus_end", "end_state"):
         options.values(key)

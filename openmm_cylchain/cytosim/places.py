@@ -16,7 +16,7 @@ from .spaces import disc_region
 _TRIES = 2000
 
 
-class UnknownDirection(ScriptError):
+class UnknownDirectionError(ScriptError):
     """A direction that is not known here."""
 
 
@@ -59,7 +59,7 @@ class Draw:
         """A random point of the space."""
         place = None if self.space is None else self.space.draw(self.generator)
         if place is None:
-            raise self.mistake("places inside a space are asked for, but there is none, or its shape is not known here.")
+            raise self.mistake("places inside a space are asked for, but there is none whose shape is known here.")
         return place
 
 
@@ -194,6 +194,11 @@ def _along_x(weight):
     return place
 
 
+def _gradient(x, first, last):
+    share = (x - first) / (last - first) if last != first else 0.0
+    return share if 0.0 <= share <= 1.0 else 0.0
+
+
 def _flat(draw, vector):
     if draw.dimensions == 2:
         vector[2] = 0.0
@@ -221,7 +226,7 @@ _PRIMITIVES = {
     "XY": _within_plane,
     "XZ": _within_plane,
     "YZ": _within_plane,
-    "gradient": _along_x(lambda x, first, last: (x - first) / (last - first) if first != last and min(first, last) <= x <= max(first, last) else 0.0),
+    "gradient": _along_x(_gradient),
     "exponential": _along_x(lambda x, first, scale: math.exp((first - x) / scale) if x >= first else 0.0),
 }
 _WITH_AXIS = {"cylinder": "X", "disc": "Z", "circle": "Z", "ring": "X"}
@@ -392,7 +397,11 @@ def draw_direction(text, place, draw):
     if words[0] in ("circular", "orthoradial"):
         around = np.cross([0.0, 0.0, 1.0] if draw.dimensions == 2 else draw.unit(), radial)
         return around / np.linalg.norm(around)
-    if draw.space is not None and draw.space.shape == "sphere" and words[0] in ("normal", "outward", "inward", "tangent"):
+    if (
+        draw.space is not None
+        and draw.space.shape == "sphere"
+        and words[0] in ("normal", "outward", "inward", "tangent")
+    ):
         if words[0] != "tangent":
             return -radial if words[0] == "inward" else radial
         across = np.cross(np.array([0.0, 0.0, 1.0]) if draw.dimensions == 2 else draw.unit(), radial)
@@ -401,7 +410,7 @@ def draw_direction(text, place, draw):
         across = np.cross(as_vector(" ".join(words[1:]), draw.line, "direction"), draw.unit())
         if np.linalg.norm(across) > 0.0:
             return across / np.linalg.norm(across)
-    raise UnknownDirection(draw.line, f"the direction {text!r} is not known here.")
+    raise UnknownDirectionError(draw.line, f"the direction {text!r} is not known here.")
 
 
 def draw_inside(text, draw, keep=True):

@@ -73,7 +73,9 @@ def add_contacts(translation):
     table.add("diameter", quantity(diameter, "um"), Note(EXACT, "twice the radius of steric"))
     stiffness = simul.number(("steric", 1), "steric_stiff_push", default=0.0)
     if stiffness > 0.0:
-        table.add("stiffness", quantity(stiffness, "pN/um"), Note(NEAREST, "of each crossing; Cytosim's is of vertices"))
+        table.add(
+            "stiffness", quantity(stiffness, "pN/um"), Note(NEAREST, "of each crossing; Cytosim's is of vertices")
+        )
     if len(set(radii.values())) > 1:
         text = f"contacts of filaments that differ: {', '.join(f'{name} {own:g} um' for name, own in radii.items())}"
         table.comment(Note(LEFT_OUT, text, simul.line_of("steric"), "contacts that differ between filaments"))
@@ -102,7 +104,9 @@ def add_walls(translation):
             free.append(fiber.name)
             continue
         if mode not in _CONFINED:
-            translation.left_out(f"confine = {mode} of {fiber.name}", settings.line_of("confine"), f"surfaces: confine = {mode}")
+            translation.left_out(
+                f"confine = {mode} of {fiber.name}", settings.line_of("confine"), f"surfaces: confine = {mode}"
+            )
             continue
         name = settings.text(("confine", 2), "confine_spec")
         stiffness = settings.number(("confine", 1), "confine_stiffness", default=0.0)
@@ -124,7 +128,7 @@ def add_walls(translation):
     for wall in space.walls:
         table = translation.document.table("[[wall]]", line)
         for key, value in wall.items():
-            table.add(key, value, Note(EXACT, f"confine = inside, {stiffness:g}", line) if key == "shape" else None)
+            table.add(key, value, Note(EXACT, f"confine = inside, {stiffness:g}" if key == "shape" else "", line))
         table.add("stiffness", quantity(stiffness, "pN/um"), Note(EXACT, "of each node"))
 
 
@@ -133,7 +137,11 @@ def add_simulation(translation):
     script, simul = translation.script, translation.script.simul
     table = translation.document.table("[simulation]", None if script.run is None else script.run.line)
     steps, run = translation.steps, script.run
-    table.add("time_step", quantity(script.time_step, "s"), Note(EXACT, "see openmm-cylchain timestep", simul.line_of("time_step")))
+    table.add(
+        "time_step",
+        quantity(script.time_step, "s"),
+        Note(EXACT, "see openmm-cylchain timestep", simul.line_of("time_step")),
+    )
     frames = 0 if run is None else int(run.number("nb_frames", default=0.0))
     per_frame = max(1, math.ceil(steps / (frames if frames > 0 else _USUAL_FRAMES)))
     if per_frame > _MOST_STEPS_PER_FRAME:
@@ -142,7 +150,11 @@ def add_simulation(translation):
     exact = whole == steps and run is not None
     text = f"{steps} steps" if run is not None else "there is no run"
     table.add("duration", quantity(whole * script.time_step, "s"), Note(EXACT if exact else NEAREST, text))
-    table.add("report_interval", quantity(per_frame * script.time_step, "s"), Note(EXACT if exact and frames else NEAREST, f"nb_frames = {frames}"))
+    table.add(
+        "report_interval",
+        quantity(per_frame * script.time_step, "s"),
+        Note(EXACT if exact and frames else NEAREST, f"nb_frames = {frames}"),
+    )
     seed = simul.number("random_seed", default=0.0)
     table.add("seed", int(seed) if 0 < seed < 2**31 else 1)
     table.add("platform", "CPU")

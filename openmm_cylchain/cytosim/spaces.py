@@ -106,7 +106,9 @@ class _Sizes:
             path = self._folder / (settings.text("file") or "")
             if path.is_file():
                 rows = [line.split("%")[0].split() for line in path.read_text(errors="replace").splitlines()]
-                return scale * np.array([as_vector(" ".join(row[:2]), settings.line, path.name)[:2] for row in rows if row])
+                return scale * np.array(
+                    [as_vector(" ".join(row[:2]), settings.line, path.name)[:2] for row in rows if row]
+                )
         return None
 
     def ends(self, index=0):

@@ -9,6 +9,7 @@ from ..errors import InputError
 from .arithmetic import evaluate
 from .grammar import ScriptError
 
+_MOST_SHOWN = 60
 _SNIPPET = re.compile(r"\[\[(.*?)\]\](?!\])", re.DOTALL)
 _ASSIGNMENT = re.compile(r"\s*\(?\s*([A-Za-z_]\w*)\s*\)?\s*=(?!=)(.*)", re.DOTALL)
 
@@ -33,6 +34,7 @@ def expand_template(text, given=None):
     def value_of(match):
         line = text.count("\n", 0, match.start()) + 1
         code = match[1]
+        shown = f"[[{code.strip().splitlines()[0][:_MOST_SHOWN] if code.strip() else ''}]]"
         assignment = _ASSIGNMENT.fullmatch(code)
         name, expression = (assignment[1], assignment[2]) if assignment else (None, code)
         if name in given:
@@ -40,11 +42,11 @@ def expand_template(text, given=None):
         try:
             value = evaluate(expression, names)
         except InputError as error:
-            raise ScriptError(line, f"[[{code.strip()}]]: {error}") from None
+            raise ScriptError(line, f"{shown}: {error}") from None
         if isinstance(value, list):
             if not value:
-                raise ScriptError(line, f"[[{code.strip()}]] has no values.")
-            choices.append((line, f"[[{code.strip()}]] has {len(value)} values, of which the first is taken, {value[0]}"))
+                raise ScriptError(line, f"{shown} has no values.")
+            choices.append((line, f"{shown} has {len(value)} values: the first is taken, {value[0]}"))
             value = value[0]
         if name is not None:
             names[name] = value

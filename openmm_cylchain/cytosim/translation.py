@@ -34,16 +34,16 @@ _BODIES = {
     "organizer": "bodies: organizers",
     "field": "fields",
 }
+_DENSITY = ("binding_rate", "unbinding_rate", "aging_rate", "aging", "aging_limit", "unit", "cut_fiber", "flux_speed")
+_OWN_WALLS = ("confine2", "squeeze", "zone_radius")
 _NEEDS = {
-    **dict.fromkeys(
-        [("fiber", key) for key in ("density", "density_unit", "density_cut_fiber", "density_flux_speed")]
-        + [("fiber", f"density_{key}") for key in ("binding_rate", "unbinding_rate", "aging_rate", "aging", "aging_limit")],
-        "densities along filaments",
-    ),
-    **dict.fromkeys([("fiber", key) for key in ("confine2", "squeeze", "zone_radius")], "walls: several, or of their own laws"),
+    **{("fiber", f"density_{key}"): "densities along filaments" for key in _DENSITY},
+    ("fiber", "density"): "densities along filaments",
+    **{("fiber", key): "walls: several, or of their own laws" for key in _OWN_WALLS},
     ("fiber", "field"): "fields",
     ("fiber", "glue"): "surfaces: glue",
     ("run", "event"): "events during a run",
+    ("new single", "attach"): "bodies",
 }
 """What keys need that nothing here asks for, by the kind of what has them."""
 _WITH_EVERY_LENGTH = ("rectangle", "square", "periodic", "strip", "semi_periodic", "ellipse", "dice")
@@ -140,8 +140,8 @@ class Translation:
         found = 2 if any(map(self._is_flat, self.script.created)) else 3
         self.document.note(
             NEAREST,
-            f"{found} dimensions, since the file does not say for which Cytosim was built: --dimensions {5 - found} for "
-            "the other",
+            f"{found} dimensions, since the file does not say for which Cytosim was built: --dimensions {5 - found} "
+            "for the other",
         )
         return found
 
