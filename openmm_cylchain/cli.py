@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from . import errors
+from .cytosim import command as cytosim
 from .errors import InputError, InstabilityError
 from .export import command as export
 from .rendering import command as rendering
@@ -149,6 +150,7 @@ def _parser():
     scans.add_command(commands)
     rendering.add_command(commands)
     export.add_command(commands)
+    cytosim.add_command(commands)
     information = commands.add_parser("info", help="print versions, engines and platforms, and why one is missing")
     information.set_defaults(command=_information)
     return parser

@@ -27,6 +27,7 @@ FLOORS = (
     ("analysis",),
     ("systems",),
     ("runs",),
+    ("cytosim",),
     ("rendering",),
     ("export",),
     ("scans",),

@@ -128,6 +128,23 @@ def _parse_unit(unit, target, name):
 
 
 def _convert(number, written, target, name):
+    factor = _factor(written, target)
+    value = _convert_in_full(number, written, target, name) if factor is None else number * factor
+    # 15 digits drop the rounding noise of the conversion: 10 ns are 10000 ps.
+    return float(f"{value:.15g}")
+
+
+@functools.lru_cache(maxsize=1000)
+def _factor(written, target):
+    # Of a unit that is right and has no offset: configurations may have thousands of quantities in it.
+    try:
+        zero, one = (_convert_in_full(number, written, target, "") for number in (0.0, 1.0))
+    except InputError:
+        return None
+    return one if zero == 0.0 else None
+
+
+def _convert_in_full(number, written, target, name):
     registry, unit = _registry(), _parse_unit(written, target, name)
     # pint reads "1/ps", not "/ps".
     symbol = re.sub("^/", "1/", target.get_symbol())
@@ -140,8 +157,7 @@ def _convert(number, written, target, name):
             candidates.append(quantity.to_base_units() * (registry.mole / AVOGADRO))
         for candidate in candidates:
             if candidate.is_compatible_with(symbol):
-                # 15 digits drop the rounding noise of the conversion: 10 ns are 10000 ps.
-                return float(f"{candidate.m_as(symbol):.15g}")
+                return float(candidate.m_as(symbol))
     except Exception:  # noqa: S110 - logarithmic units, such as decibels, make pint raise anything as well.
         pass
     kind, example_of_kind = _EXAMPLES[target]

@@ -1,0 +1,1 @@
+"""Configurations of Cytosim as configurations of runs: the command ``import``."""

@@ -1,0 +1,240 @@
+"""Growth of fibers: activities grow, treadmill, classic and dynamic as [[monomers]] and growth of [[filament]].
+
+Laws of Cytosim are in ``doc/sim/fiber_dynamics.md`` and ``src/sim/fibers``. An end that grows has there the speed
+``growing_speed * free * exp(-load/growing_force) + growing_off_speed``, with the share ``free`` of the polymer that is
+in no fiber; here, monomers of the length delta come at the rate k_on c and go at k_off.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+from .document import EXACT, NEAREST, Note, quantity
+
+_STATES = {"white": 0, "green": 1, "yellow": 2, "orange": 3, "red": 4, "static": 0}
+_STATES |= {"grow": 1, "growing": 1, "shrink": 4, "shrinking": 4}
+_STILL, _GROWING, _SHRINKING = 0, 1, 4
+_ENDS = ("plus", "minus")
+_USUAL_MONOMER = 0.008
+_REFERENCE = 1.0
+"""Concentration in uM at which all of the polymer is free."""
+_PER_UM3 = 602.214076
+"""Number in 1 um^3 at 1 uM."""
+_NO_FORCE = 1e6
+"""In pN: a growing_force so large that loads change nothing."""
+_MOST_LENGTH, _MANY_CATASTROPHES = 200.0, 20.0
+
+
+@dataclass
+class Growing:
+    """How fibers of one property with the same states of their ends grow.
+
+    ``entries`` are (key, value, Note) of the growth table, ``rates`` those of monomers, ``monomer`` is the length of
+    one in um, ``speed`` that of an end in um/s, ``turns`` how often it turns in 1/s, and ``length`` that of all fibers.
+    """
+
+    name: str
+    settings: object
+    monomer: float
+    rates: list = field(default_factory=list)
+    entries: list = field(default_factory=list)
+    speed: float = 0.0
+    turns: float = 0.0
+    length: float = 0.0
+
+
+def state_of(options, end):
+    """Number of the state of the "plus" or "minus" end of fibers that are created."""
+    text = options.text(f"{end}_end", f"{end}_end_state", ("end_state", _ENDS.index(end)), default="0")
+    if text in _STATES:
+        return _STATES[text]
+    return int(text) if text in "01234" and len(text) == 1 else _STILL
+
+
+def read_growth(translation, fiber, options):
+    """The Growing of fibers of a Property that are created with options, or None if they do not grow."""
+    settings = fiber.settings
+    activity = settings.text("activity", default="none")
+    states = {end: state_of(options, end) for end in _ENDS}
+    for key in ("growing_speed", "shrinking_speed", "growing_force", "growing_off_speed", "total_polymer"):
+        settings.values(key)
+    for key in ("min_length", "max_length", "persistent", "fate", "delete_stub", "rebirth_rate"):
+        settings.values(key)
+    if activity in ("none", "fiber", ""):
+        return None
+    if activity not in _LAWS:
+        translation.left_out(
+            f"activity = {activity} of {settings.label}", settings.line_of("activity"), "growth: " + activity
+        )
+        return None
+    rebirth = settings.number("rebirth_rate", default=0.0) > 0.0
+    if all(state == _STILL for state in states.values()) and not rebirth:
+        translation.document.note(EXACT, f"{fiber.name}: both ends are static, so it keeps its length", options.line)
+        return None
+    monomer = settings.number("unit_length", default=_USUAL_MONOMER if activity == "dynamic" else None)
+    if monomer is None:
+        segment = settings.number("segmentation", default=1.0)
+        monomer = segment / max(2, round(segment / _USUAL_MONOMER))
+    growing = Growing(fiber.name, settings, monomer)
+    _LAWS[activity](translation, growing, states)
+    if not growing.rates and len(growing.entries) > 1 and activity not in ("classic", "dynamic"):
+        translation.document.note(EXACT, f"{fiber.name}: its speeds are zero, so it keeps its length", options.line)
+        return None
+    _add_ends(translation, growing, activity, rebirth)
+    return growing
+
+
+def _rate(growing, end, on, off):
+    # Speeds in um/s as rates of monomers.
+    growing.speed = max(growing.speed, on)
+    for name, speed, unit in (("on", on / _REFERENCE, "1/(uM*s)"), ("off", off, "1/s")):
+        if speed > 0.0:
+            value = quantity(speed / growing.monomer, unit)
+            growing.rates.append((f"{end}_{name}_rate", value, Note(EXACT, f"{speed:g} um/s", growing.settings.line)))
+
+
+def _speed(growing, key, end):
+    return growing.settings.number((key, _ENDS.index(end)), default=0.0)
+
+
+def _cap(growing, end):
+    growing.entries.append((f"{end}_capped", True, Note(EXACT, f"the {end} end is static")))
+
+
+def _simple(translation, growing, states, end):
+    # An end that only grows, or only shrinks.
+    if states[end] == _STILL:
+        return _cap(growing, end)
+    off = _speed(growing, "growing_off_speed", end)
+    if states[end] == _GROWING:
+        on = _speed(growing, "growing_speed", end) + max(off, 0.0)
+        off = max(-off, 0.0)
+    else:
+        on, off = 0.0, -_speed(growing, "shrinking_speed", end)
+    if on <= 0.0 and off <= 0.0:
+        return _cap(growing, end)
+    return _rate(growing, end, on, off)
+
+
+def _grow(translation, growing, states):
+    for end in _ENDS:
+        _simple(translation, growing, states, end)
+    growing.entries.append(("deterministic", True, Note(EXACT, "lengths change at constant speeds")))
+
+
+def _turning(translation, growing, states, key):
+    # The plus end grows and shrinks in turn, the minus end does one of them.
+    settings = growing.settings
+    if states["plus"] == _STILL:
+        _cap(growing, "plus")
+    else:
+        if states["plus"] == _SHRINKING:
+            translation.left_out(
+                f"{growing.name}: the plus end begins to shrink, and grows at first here",
+                settings.line,
+                "growth: ends that begin by shrinking",
+            )
+        on, off = _speed(growing, "growing_speed", "plus"), _speed(growing, "growing_off_speed", "plus")
+        _rate(growing, "plus", on, -off)
+        rate = settings.number(key, default=0.0)
+        growing.entries.append((key, quantity(rate, "1/s"), Note(EXACT, "", settings.line_of(key))))
+        growing.turns = rate
+        rescue = settings.number("rescue_rate", default=0.0)
+        growing.entries.append(("rescue_rate", quantity(rescue, "1/s"), Note(EXACT, "", settings.line)))
+        shrinking = -settings.number("shrinking_speed", default=0.0)
+        note = Note(EXACT, f"{shrinking:g} um/s", settings.line_of("shrinking_speed"))
+        growing.entries.append(("shrinking_off_rate", quantity(shrinking / growing.monomer, "1/s"), note))
+    if states["minus"] == _GROWING and settings.number((key, 1), default=0.0) > 0.0:
+        translation.left_out(
+            f"{growing.name}: catastrophes of the minus end", settings.line_of(key), "growth: minus ends that turn"
+        )
+    if states["minus"] == _SHRINKING and settings.number(("rescue_rate", 1), default=0.0) > 0.0:
+        translation.left_out(f"{growing.name}: rescues of the minus end", settings.line, "growth: minus ends that turn")
+    _simple(translation, growing, states, "minus")
+
+
+def _classic(translation, growing, states):
+    settings = growing.settings
+    stalled = settings.number("catastrophe_rate_stalled", default=0.0)
+    if stalled == 0.0 and settings.number(("catastrophe_rate", 1), default=0.0) > 0.0:
+        # As Cytosim before 2018 had it, and reads it where the minus end does nothing.
+        if states["minus"] == _STILL:
+            stalled = settings.number(("catastrophe_rate", 1))
+    if stalled > 0.0:
+        translation.left_out(
+            f"{growing.name}: the catastrophe rate of a stalled end, {stalled:g} 1/s: it is that of a free end always",
+            settings.line_of("catastrophe_rate"),
+            "growth: catastrophes that depend on load",
+        )
+    _turning(translation, growing, states, "catastrophe_rate")
+    growing.entries.append(("deterministic", True, Note(EXACT, "lengths change at constant speeds")))
+
+
+def _dynamic(translation, growing, states):
+    _turning(translation, growing, states, "hydrolysis_rate")
+
+
+_LAWS = {"grow": _grow, "treadmill": _grow, "classic": _classic, "dynamic": _dynamic}
+
+
+def _add_ends(translation, growing, activity, rebirth):
+    settings = growing.settings
+    force = settings.number("growing_force", "dynamic_force", default=math.inf)
+    if math.isfinite(force) and force > 0.0:
+        note = Note(NEAREST, "of Cytosim, which has no equilibrium; delete it for one that has", settings.line)
+        growing.entries.append(("growing_force", quantity(force, "pN"), note))
+    else:
+        note = Note(EXACT, "loads do not slow growth down; delete it for growth with an equilibrium")
+        growing.entries.append(("growing_force", quantity(_NO_FORCE, "pN"), note))
+    stub = settings.number("delete_stub")
+    persistent = settings.flag("persistent", default=stub == 0.0 if stub is not None else False)
+    shrinks = any(key.endswith("off_rate") for key, *_ in (*growing.rates, *growing.entries))
+    if shrinks and not persistent:
+        note = Note(EXACT, "one of the shortest length is deleted (persistent = 0)", settings.line)
+        growing.entries.append(("vanishes", True, note))
+    if rebirth and persistent:
+        translation.left_out(
+            f"{growing.name}: rebirth_rate of those that have shrunk",
+            settings.line_of("rebirth_rate"),
+            "growth: rebirth",
+        )
+
+
+def longest_of(translation, growing, length):
+    """The length in um for which fibers have places, and its Note."""
+    settings = growing.settings
+    given = settings.number("max_length", default=math.inf)
+    grown = length + growing.speed * translation.duration
+    polymer = settings.number("total_polymer", default=math.inf)
+    typical = math.inf
+    if growing.turns > 0.0 and settings.number("rescue_rate", default=0.0) == 0.0:
+        typical = length + _MANY_CATASTROPHES * growing.speed / growing.turns
+    longest = min(given, 1.05 * grown, polymer, typical, max(_MOST_LENGTH, 2.0 * length))
+    longest = max(longest, 1.01 * length, length + 2.0 * growing.monomer)
+    if longest == given:
+        return longest, Note(NEAREST, "max_length, beyond which there may be up to two segments", settings.line)
+    return longest, Note(EXACT if longest >= min(grown, polymer) else NEAREST, "for which there are places")
+
+
+def add_monomers(translation, growings):
+    """A [[monomers]] table for each Growing."""
+    for growing in growings:
+        table = translation.document.table("[[monomers]]", growing.settings.line)
+        table.add("name", growing.name)
+        table.add("length", quantity(growing.monomer, "um"), Note(EXACT, "of what is added at once"))
+        for key, value, note in growing.rates:
+            table.add(key, value, note)
+        if not growing.rates:
+            table.add("plus_on_rate", "1e-9 1/(uM*s)", Note(NEAREST, "next to nothing"))
+        total = growing.settings.number("total_polymer", default=math.inf)
+        if not math.isfinite(total):
+            table.add("concentration", quantity(_REFERENCE, "uM"), Note(EXACT, "which gives the speeds above"))
+            continue
+        free = max(0.0, 1.0 - growing.length / total)
+        table.add("concentration", quantity(_REFERENCE * free, "uM"), Note(EXACT, f"{free:.3g} of the polymer is free"))
+        volume = total / growing.monomer / (_REFERENCE * _PER_UM3)
+        table.add("volume", quantity(volume, "um^3"), Note(EXACT, f"in which total_polymer is {total:g} um"))
+
+
+def same_growth(one, other):
+    """Whether two Growings share their monomers."""
+    return one.settings is other.settings and one.rates == other.rates and one.monomer == other.monomer

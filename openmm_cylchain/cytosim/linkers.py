@@ -1,0 +1,299 @@
+"""Singles and couples as [[linkers]], and as [[link]] where they join for ever what they are attached to."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .attached import GROWING, PLACED
+from .document import EXACT, LEFT_OUT, NEAREST, Note, point, quantity
+from .hands import read_hand
+from .places import Draw, draw_inside, unknown_position
+from .script import count_of
+
+_DIFFUSION, _PAIRS = "linkers that diffuse by themselves", "rules for pairs of hands"
+_MOST_ANCHORS = 50_000
+_RANGE_AND_LAW = (
+    "k_on/(2 reach) exp(-U/kT) for each length within reach of a hand that is tied, which has an equilibrium; in "
+    "Cytosim it is k_on wherever a fiber is within reach, however strained"
+)
+_COUPLES = {
+    "fork": "links that hold an angle (fork)",
+    "slide": "hands that slip along filaments",
+    "duo": "linkers that are active in places (duo)",
+}
+
+
+@dataclass
+class Linked:
+    """What is created of one single or couple: how many, how many of them bound, and points of anchors."""
+
+    count: int = 0
+    bound: int = 0
+    points: list = field(default_factory=list)
+
+
+def add_linkers(translation, news):
+    """Add the singles and couples of Newly created objects: one [[linkers]] table for each property."""
+    kinds = {}
+    for new in news:
+        own = translation.script.named(new.name, new.kind, new.line)
+        linked = kinds.setdefault(new.name, Linked())
+        adder = _couples if own.kind == "couple" else _singles
+        adder(translation, own, new, linked)
+    for name, linked in kinds.items():
+        own = translation.script.properties[name]
+        if linked.points or linked.count:
+            (_couple_table if own.kind == "couple" else _single_table)(translation, own, linked)
+        else:
+            own.settings.take_rest()
+
+
+def _hands_of(translation, own):
+    keys = ("hand1", "hand2") if own.kind == "couple" else ("hand",)
+    names = [own.settings.text(key) for key in keys]
+    if None in names:
+        raise own.settings.mistake(keys[names.index(None)], "must be given.")
+    return [read_hand(translation, name, own.settings.line) for name in names]
+
+
+def _couples(translation, own, new, linked):
+    count = count_of(new, translation.space())
+    options = new.settings
+    for key in ("position", "orientation", "direction", "placement", "range"):
+        options.values(key)
+    keys = [key for key in ("attach1", "attach2", "site1", "site2") if key in options]
+    if len(keys) < 2:
+        for key in keys:
+            if len(options.values(key)) > 1 or translation.find_filament(options.text(key)) is not None:
+                translation.left_out(f"{key} of {new.name}", options.line_of(key), PLACED)
+            else:
+                linked.bound += count
+        linked.count += count
+        return
+    hands = _hands_of(translation, own)
+    places = [_site(translation, options, key) for key in keys]
+    if None in places or not all(hand.stays for hand in hands) or own.settings.text("activity") in _COUPLES:
+        translation.left_out(f"where {count} {new.name} are attached", new.line, PLACED)
+        linked.count += count
+        linked.bound += count
+    elif any(place["grows"] for place in places):
+        translation.left_out(f"{count} {new.name} that join for ever", new.line, GROWING)
+    else:
+        for _ in range(count):
+            _link(translation, own, new, places[0]["at"], places[1]["at"])
+
+
+def _site(translation, options, key):
+    # A place on a filament, or None.
+    made = translation.find_filament(options.text(key))
+    if made is None:
+        return None
+    along = options.number((key, 1), default=None)
+    if along is None:
+        return None
+    reference = options.text((key, 2), default="minus_end")
+    along = {"plus_end": made.length - along, "center": 0.5 * made.length + along}.get(reference, along)
+    along = min(max(along, 0.0), made.length)
+    at = {"filament": made.number, "arc_length": quantity(along, "um")}
+    if along == made.length:
+        at = {"filament": made.number, "node": -1}
+    elif along == 0.0:
+        at = {"filament": made.number, "node": 0}
+    return {"at": at, "grows": made.grows}
+
+
+def _link(translation, own, new, first, second):
+    table = translation.document.table("[[link]]", new.line)
+    note = Note(EXACT, f"{new.name}, whose hands never unbind", new.line)
+    table.add("between", [first, second], note)
+    table.add("stiffness", quantity(_stiffness(translation, own), "pN/um"), Note(EXACT, "", own.line))
+    table.add("rest_length", quantity(own.settings.number("length", default=0.0), "um"))
+    for hand in own.settings.values("hand1") + own.settings.values("hand2") + own.settings.values("hand"):
+        read_hand(translation, hand, own.line)
+    _read_rest(own.settings)
+
+
+def _stiffness(translation, own):
+    stiffness = own.settings.number("stiffness", default=0.0)
+    if stiffness > 0.0:
+        return stiffness
+    translation.document.note(NEAREST, f"{own.name}: a stiffness of 1e-3 pN/um for {stiffness:g}", own.line)
+    return 1e-3
+
+
+def _read_rest(settings):
+    for key in (
+        "diffusion",
+        "fast_diffusion",
+        "min_loop",
+        "stiff",
+        "activity",
+        "confine",
+        "confine_spec",
+        "specificity",
+    ):
+        settings.values(key)
+
+
+def _singles(translation, own, new, linked):
+    count = count_of(new, translation.space())
+    options, fixed = new.settings, own.settings.text("activity") == "fixed"
+    for key in ("position", "orientation", "direction", "placement", "range", "base"):
+        options.values(key)
+    if "base" in options:
+        translation.left_out(f"{count} {new.name} on a body", new.line, "bodies")
+        return
+    if "attach" in options or "attach1" in options:
+        _attached(translation, own, new, linked, count, "attach" if "attach" in options else "attach1")
+        return
+    if not fixed:
+        linked.count += count
+        return
+    linked.points += _points(translation, new, count, len(linked.points))
+
+
+def _attached(translation, own, new, linked, count, key):
+    options = new.settings
+    site = _site(translation, options, key)
+    (hand,) = _hands_of(translation, own)
+    if site is None or not hand.stays or own.settings.text("activity") != "fixed":
+        translation.left_out(f"where {count} {new.name} are attached", new.line, PLACED)
+        if own.settings.text("activity") == "fixed":
+            linked.points += _points(translation, new, count, len(linked.points))
+        else:
+            linked.count += count
+    elif site["grows"]:
+        translation.left_out(f"{count} {new.name} that hold for ever", new.line, GROWING)
+    else:
+        for place in _points(translation, new, count, 0):
+            _link(translation, own, new, site["at"], {"point": point(place)})
+
+
+def _points(translation, new, count, before):
+    if before + count > _MOST_ANCHORS:
+        translation.left_out(
+            f"{before + count - _MOST_ANCHORS} of {before + count} anchors",
+            new.line,
+            f"more than {_MOST_ANCHORS} anchors",
+        )
+        count = _MOST_ANCHORS - before
+    options = new.settings
+    text = options.text("position", default="inside")
+    word = unknown_position(text)
+    if word is not None:
+        translation.left_out(f"{count} {new.name} at {text!r}", options.line_of("position"), f"positions: {word}")
+        return []
+    space = translation.space(options.text(("position", 1)))
+    draw = Draw(space, translation.dimensions, translation.generator, new.line)
+    keep, places = options.text("placement", default="inside") == "inside", []
+    first, last = (options.vector("range", own) for own in (0, 1))
+    for number in range(count):
+        if first is not None and last is not None:
+            places.append(np.array(first) + np.subtract(last, first) * number / max(1, count - 1))
+            continue
+        # An anchor that is given lies where it is, also outside.
+        place = draw_inside(text, draw, keep)
+        places.append(draw_inside(text, draw, False) if place is None else place)
+    return places
+
+
+def _single_table(translation, own, linked):
+    settings = own.settings
+    fixed = settings.text("activity") == "fixed"
+    (hand,) = _hands_of(translation, own)
+    if not _binds(translation, own, [hand]):
+        return
+    table = translation.document.table("[[linkers]]", own.line)
+    table.add("name", own.name, Note(EXACT, f"single {own.name}", own.line))
+    _add_spring(translation, table, own)
+    if fixed:
+        table.add("hand", hand.table, Note(NEAREST, _RANGE_AND_LAW))
+        table.add("anchors", [point(place) for place in linked.points], Note(EXACT, "activity = fixed"))
+        settings.values("diffusion")
+    else:
+        idle = {"binding_rate": "0 1/s", "reach": hand.table["reach"], "unbinding_rate": "0 1/s"}
+        table.add("hands", [hand.table, idle], Note(NEAREST, "a second hand that never binds"))
+        _add_count(translation, table, own, linked, hand)
+    for note in hand.notes:
+        table.comment(note)
+
+
+def _couple_table(translation, own, linked):
+    settings = own.settings
+    hands = _hands_of(translation, own)
+    if not _binds(translation, own, hands):
+        return
+    table = translation.document.table("[[linkers]]", own.line)
+    table.add("name", own.name, Note(EXACT, f"couple {own.name}", own.line))
+    _add_spring(translation, table, own)
+    note = Note(NEAREST, _RANGE_AND_LAW)
+    if hands[0].table == hands[1].table:
+        table.add("hand", hands[0].table, note)
+    else:
+        table.add("hands", [hand.table for hand in hands], note)
+    loop = settings.number("min_loop", "stiff", default=1.0)
+    if loop <= 0.0:
+        table.add("same_filament", True, Note(EXACT, "min_loop = 0", settings.line_of("min_loop")))
+    else:
+        table.comment(Note(NEAREST, f"its hands bind to two filaments; in Cytosim to one as well, {loop:g} um apart"))
+    _add_count(translation, table, own, linked, hands[0])
+    if linked.bound:
+        bound = min(linked.bound, linked.count)
+        table.add("bound", bound, Note(NEAREST, "attach1: one hand is bound, at random"))
+    activity = settings.text("activity", default="diffuse")
+    if activity in _COUPLES:
+        settings.take_rest()
+        table.comment(Note(LEFT_OUT, f"activity = {activity}", settings.line_of("activity"), _COUPLES[activity]))
+    for key in ("specificity", "trans_activated"):
+        if settings.text(key) not in (None, "0", "off", "none"):
+            text = f"{key} = {settings.text(key)}"
+            table.comment(Note(LEFT_OUT, text, settings.line_of(key), _PAIRS))
+    for note in dict.fromkeys(hands[0].notes + hands[1].notes):
+        table.comment(note)
+
+
+def _binds(translation, own, hands):
+    if all(hand.types for hand in hands):
+        return True
+    kind = "they have nothing to bind to"
+    translation.document.note(EXACT if translation.made else LEFT_OUT, f"{own.name}: {kind}", own.line)
+    own.settings.take_rest()
+    return False
+
+
+def _add_spring(translation, table, own):
+    table.add("stiffness", quantity(_stiffness(translation, own), "pN/um"), Note(EXACT, ""))
+    length = own.settings.number("length", default=0.0)
+    if length > 0.0:
+        table.add(
+            "rest_length", quantity(length, "um"), Note(NEAREST, "a spring in any direction; Cytosim's is across")
+        )
+
+
+def _add_count(translation, table, own, linked, hand):
+    settings = own.settings
+    table.add("count", linked.count, Note(EXACT, ""))
+    fast = settings.text("diffusion") == "fast" or settings.flag("fast_diffusion")
+    if not fast:
+        rate = settings.number("diffusion", default=0.0)
+        text = f"diffusion = {rate:g} um^2/s: those that are not bound are anywhere here"
+        table.comment(Note(LEFT_OUT, text, settings.line_of("diffusion"), _DIFFUSION))
+    if settings.text("confine") in ("on", "surface"):
+        table.comment(Note(LEFT_OUT, "confine = on", settings.line_of("confine"), "surfaces: linkers on one"))
+    if settings.number(("fast_diffusion", 1), default=0.0) > 0.0:
+        table.comment(Note(LEFT_OUT, "a reservoir of a fixed number", settings.line, "linkers: reservoirs"))
+    name = settings.text(("confine", 2), "confine_spec")
+    space = translation.space(None if name in ("first", "last") else name)
+    if space is None or space.volume is None:
+        if translation.document.tables_called("[box]"):
+            return
+        table.add("volume", "1000 um^3", Note(LEFT_OUT, "the volume of the space", own.line, "spaces: volume"))
+        return
+    # Binding from solution, per length of filament: (2/3) pi R^2 k/V here, pi R^2 k/V there and 2 R k/A in the plane.
+    if translation.dimensions == 2:
+        volume, why = math.pi * hand.reach * space.volume / 3.0, "pi reach/3 of its area"
+    else:
+        volume, why = 2.0 / 3.0 * space.volume, "2/3 of it"
+    note = Note(EXACT, f"{why}, by which hands bind from solution as often as in Cytosim")
+    table.add("volume", quantity(volume, "um^3"), note)

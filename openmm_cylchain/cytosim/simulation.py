@@ -1,0 +1,173 @@
+"""simul and run as [solvent], [box], [contacts], [[wall]] and [simulation]."""
+
+import math
+
+from ..errors import InputError
+from .document import EXACT, LEFT_OUT, NEAREST, Note, quantity
+
+_BOLTZMANN = 1.380649e-5
+"""In pN um/K."""
+_COLDEST = 1e-3
+_USUAL_FRAMES = 100
+_MOST_STEPS_PER_FRAME = 10**7
+_CONFINED = ("inside", "all_inside", "1")
+_FREE = (None, "off", "none", "0")
+
+
+def thermal_energy(simul):
+    """kT in pN um."""
+    kelvin = simul.number("temperature")
+    energy = simul.number("kT", "thermal_energy", default=0.0042 if kelvin is None else _BOLTZMANN * kelvin)
+    if not 0.0 <= energy < math.inf:
+        raise simul.mistake("kT", "must not be negative.")
+    return energy
+
+
+def add_solvent(translation):
+    """The [solvent] table."""
+    simul, energy = translation.script.simul, translation.thermal_energy
+    table = translation.document.table("[solvent]", simul.line)
+    temperature = energy / _BOLTZMANN
+    if temperature < _COLDEST:
+        table.add("temperature", quantity(_COLDEST, "K"), Note(NEAREST, "kT = 0", simul.line_of("kT")))
+    else:
+        table.add("temperature", quantity(temperature, "K"), Note(EXACT, f"kT = {energy:g} pN um", simul.line_of("kT")))
+    if not 0.0 < translation.viscosity < math.inf:
+        raise simul.mistake("viscosity", "must be positive.")
+    viscosity = quantity(translation.viscosity, "pN*s/um^2")
+    table.add("viscosity", viscosity, Note(EXACT, "that is Pa s", simul.line_of("viscosity")))
+    flow = simul.vector("flow")
+    if flow is not None and any(flow):
+        table = translation.document.table("[flow]", simul.line_of("flow"))
+        table.add("velocity", [quantity(own, "um/s") for own in flow], Note(EXACT, "flow"))
+
+
+def contact_diameter(script):
+    """The distance in um at which fibers touch, or None if they do not."""
+    simul = script.simul
+    if simul.text("steric") in _FREE:
+        return None
+    radii = [_steric_radius(own.settings) for own in script.properties.values() if own.kind == "fiber"]
+    return 2.0 * max(radii, default=0.0) or None
+
+
+def _steric_radius(settings):
+    if settings.text("steric") in _FREE:
+        return 0.0
+    return settings.number(("steric", 1), "steric_radius", default=0.0)
+
+
+def add_contacts(translation):
+    """The [contacts] table, if fibers touch each other."""
+    simul, diameter = translation.script.simul, translation.contact_diameter
+    radii = {fiber.name: _steric_radius(fiber.settings) for fiber in translation.fibers_made()}
+    for fiber in translation.fibers_made():
+        extra = fiber.settings.number(("steric", 2), "steric_range", default=0.0)
+        pull = simul.number(("steric", 2), "steric_stiff_pull", default=0.0)
+        if diameter and extra > 0.0 and pull > 0.0:
+            line = fiber.settings.line_of("steric")
+            translation.left_out(f"the attraction of {fiber.name} beyond contact", line, "contacts that attract")
+    if diameter is None or not any(radii.values()):
+        return
+    table = translation.document.table("[contacts]", simul.line_of("steric"))
+    table.add("diameter", quantity(diameter, "um"), Note(EXACT, "twice the radius of steric"))
+    stiffness = simul.number(("steric", 1), "steric_stiff_push", default=0.0)
+    if stiffness > 0.0:
+        table.add(
+            "stiffness", quantity(stiffness, "pN/um"), Note(NEAREST, "of each crossing; Cytosim's is of vertices")
+        )
+    if len(set(radii.values())) > 1:
+        text = f"contacts of filaments that differ: {', '.join(f'{name} {own:g} um' for name, own in radii.items())}"
+        table.comment(Note(LEFT_OUT, text, simul.line_of("steric"), "contacts that differ between filaments"))
+
+
+def add_box(translation):
+    """The [box] of a periodic space."""
+    space = translation.space()
+    if space is None or not space.edges:
+        return
+    known = [edge for edge in space.edges if edge]
+    edges = [edge or max(4.0 * half, min(known)) for edge, half in zip(space.edges, space.half)]
+    table = translation.document.table("[box]")
+    note = Note(EXACT, f"space of the shape {space.shape}; of an edge that does not repeat, any length")
+    table.add("edges", [quantity(edge, "um") for edge in edges], note)
+
+
+def add_walls(translation):
+    """The [[wall]] tables of what fibers are confined by."""
+    found, free = {}, []
+    for fiber in translation.fibers_made():
+        settings = fiber.settings
+        mode = settings.text("confine")
+        settings.values("confine_stiffness")
+        if mode in _FREE:
+            free.append(fiber.name)
+            continue
+        if mode not in _CONFINED:
+            translation.left_out(
+                f"confine = {mode} of {fiber.name}", settings.line_of("confine"), f"surfaces: confine = {mode}"
+            )
+            continue
+        name = settings.text(("confine", 2), "confine_spec")
+        stiffness = settings.number(("confine", 1), "confine_stiffness", default=0.0)
+        found.setdefault((None if name in ("first", "last") else name, stiffness), fiber)
+    if not found:
+        return
+    if len(found) > 1 or free:
+        others = f"{', '.join(free)} is not confined" if free else "they are confined in different ways"
+        translation.left_out(f"walls are for all filaments here, but {others}", None, "walls for some filaments alone")
+    (name, stiffness), fiber = next(iter(found.items()))
+    space, line = translation.space(name), fiber.settings.line_of("confine")
+    if space is None or space.walls is None:
+        shape = translation.shape_name(name)
+        translation.left_out(f"the wall of the shape {shape}", line, f"walls: {shape}")
+        return
+    if stiffness <= 0.0:
+        translation.document.note(EXACT, f"confine of {fiber.name} has no stiffness", line)
+        return
+    for wall in space.walls:
+        table = translation.document.table("[[wall]]", line)
+        for key, value in wall.items():
+            table.add(key, value, Note(EXACT, f"confine = inside, {stiffness:g}" if key == "shape" else "", line))
+        table.add("stiffness", quantity(stiffness, "pN/um"), Note(EXACT, "of each node"))
+
+
+def add_simulation(translation):
+    """The [simulation] table."""
+    script, simul = translation.script, translation.script.simul
+    table = translation.document.table("[simulation]", None if script.run is None else script.run.line)
+    steps, run = translation.steps, script.run
+    table.add(
+        "time_step",
+        quantity(script.time_step, "s"),
+        Note(EXACT, "see openmm-cylchain timestep", simul.line_of("time_step")),
+    )
+    frames = 0 if run is None else int(run.number("nb_frames", default=0.0))
+    per_frame = max(1, math.ceil(steps / (frames if frames > 0 else _USUAL_FRAMES)))
+    if per_frame > _MOST_STEPS_PER_FRAME:
+        raise InputError(f"{steps} steps are too many for {frames} frames.")
+    whole = per_frame * math.ceil(steps / per_frame)
+    exact = whole == steps and run is not None
+    text = f"{steps} steps" if run is not None else "there is no run"
+    table.add("duration", quantity(whole * script.time_step, "s"), Note(EXACT if exact else NEAREST, text))
+    table.add(
+        "report_interval",
+        quantity(per_frame * script.time_step, "s"),
+        Note(EXACT if exact and frames else NEAREST, f"nb_frames = {frames}"),
+    )
+    seed = simul.number("random_seed", default=0.0)
+    table.add("seed", int(seed) if 0 < seed < 2**31 else 1)
+    table.add("platform", "CPU")
+    if run is not None:
+        _read_run(translation, run)
+
+
+def _read_run(translation, run):
+    for key in ("nb_steps", "duration", "time", "nb_frames"):
+        run.values(key)
+    mode = run.text("solve", default="on")
+    if mode in ("off", "0"):
+        text = "solve = off, with which fibers stand still: here they move"
+        translation.document.note(LEFT_OUT, text, run.line_of("solve"), "filaments that stand still")
+    elif mode not in ("on", "auto", "1"):
+        translation.left_out(f"solve = {mode}", run.line_of("solve"), f"solve = {mode}")

@@ -1,0 +1,252 @@
+"""From a configuration of Cytosim to a configuration of a run: a Document, and what it says was done."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from .document import LEFT_OUT, NEAREST, Document
+from .filaments import add_filaments
+from .growth import add_monomers
+from .linkers import add_linkers
+from .nucleation import add_event
+from .script import count_of, read_script
+from .simulation import (
+    add_box,
+    add_contacts,
+    add_simulation,
+    add_solvent,
+    add_walls,
+    contact_diameter,
+    thermal_energy,
+)
+from .spaces import make_space
+
+_BODIES = {
+    "solid": "bodies: solids",
+    "bead": "bodies: beads",
+    "sphere": "bodies: spheres",
+    "aster": "bodies: asters",
+    "nucleus": "bodies: nuclei",
+    "fake": "bodies: spindles (fake)",
+    "bundle": "bundles of fibers",
+    "organizer": "bodies: organizers",
+    "field": "fields",
+}
+_DENSITY = ("binding_rate", "unbinding_rate", "aging_rate", "aging", "aging_limit", "unit", "cut_fiber", "flux_speed")
+_OWN_WALLS = ("confine2", "squeeze", "zone_radius")
+_NEEDS = {
+    **{("fiber", f"density_{key}"): "densities along filaments" for key in _DENSITY},
+    ("fiber", "density"): "densities along filaments",
+    **{("fiber", key): "walls: several, or of their own laws" for key in _OWN_WALLS},
+    ("fiber", "field"): "fields",
+    ("fiber", "glue"): "surfaces: glue",
+    ("run", "event"): "events during a run",
+    ("new single", "attach"): "bodies",
+}
+"""What keys need that nothing here asks for, by the kind of what has them."""
+_WITH_EVERY_LENGTH = ("rectangle", "square", "periodic", "strip", "semi_periodic", "ellipse", "dice")
+_SEED = 1
+
+
+class Translation:
+    """What is known while a Script is translated into its ``document``.
+
+    ``start_files`` are arrays of positions in nm by the names of files, which lie beside the configuration.
+    """
+
+    def __init__(self, script, title, stem, dimensions=None, folder="."):
+        self._folder = folder
+        self.script, self.document, self._stem = script, Document(title), stem
+        self.generator = np.random.default_rng(_SEED)
+        self.thermal_energy = thermal_energy(script.simul)
+        self.viscosity = script.simul.number("viscosity", default=1.0)
+        self.nucleated = []
+        self.growings, self.made, self.filament_count, self.start_files = [], [], 0, {}
+        self._spaces, self._type_names = {}, {}
+        self.dimensions = self._find_dimensions(dimensions)
+        self.contact_diameter = contact_diameter(script)
+        self.steps = max(1, script.steps)
+        self.duration = self.steps * script.time_step
+
+    def left_out(self, text, line, needs):
+        """Note what is left out, and what it needs."""
+        self.document.note(LEFT_OUT, text, line, needs)
+
+    def space(self, name=None):
+        """The Space of a name, or the first one; None if there is none, or its shape is not known here."""
+        if name is None:
+            return next(iter(self._spaces.values()), None)
+        return self._spaces.get(name, None)
+
+    def shape_name(self, name=None):
+        """What Cytosim calls the shape of a space."""
+        names = [name] if name is not None else [new.name for new in self.script.created if new.kind == "space"]
+        own = self.script.properties.get(names[0]) if names else None
+        return "?" if own is None else own.settings.text("shape", "geometry", default="?")
+
+    def type_name(self, name):
+        """The name of the type of filaments of a fiber: up to five letters or digits, each of one fiber."""
+        if name not in self._type_names:
+            letters = re.sub(r"[^A-Za-z0-9]", "", name)[:5] or "F"
+            number, own = 1, letters
+            while own in self._type_names.values():
+                number += 1
+                own = f"{letters[: 5 - len(str(number))]}{number}"
+            self._type_names[name] = own
+        return self._type_names[name]
+
+    def fibers_made(self):
+        """Properties of the fibers that are there."""
+        names = dict.fromkeys([*(own.name for own in self.made), *self.nucleated])
+        return [self.script.properties[name] for name in names]
+
+    def find_filament(self, text):
+        """The filament that an attachment names, such as actin1, fiber2 or last; None if there is none."""
+        words = re.fullmatch(r"(last|first|[A-Za-z]\w*?)\s*[:~]?\s*(-?\s*\d+)?", (text or "").strip())
+        if words is None or not self.made:
+            return None
+        name, number = words[1], int((words[2] or "0").replace(" ", ""))
+        made = self.made
+        if name == "last":
+            index = len(made) - 1 + (number if number <= 0 else -number)
+        elif name == "first":
+            index = number
+        else:
+            if words[2] is None:
+                return None
+            if name != "fiber":
+                made = [own for own in made if own.name == name]
+            index = number - 1 if number > 0 else len(made) - 1 + number
+        return made[index] if 0 <= index < len(made) else None
+
+    def start_file(self, positions):
+        """Keep an array of positions in nm as a file, and return its name."""
+        name = f"{self._stem}_{len(self.start_files) + 1}.npy"
+        self.start_files[name] = positions
+        return name
+
+    def _find_dimensions(self, dimensions):
+        given = self.script.simul.number("dim", "dimension")
+        if given is not None and given not in (1.0, 2.0, 3.0):
+            raise self.script.simul.mistake("dim", "must be 2 or 3.")
+        if dimensions is not None:
+            return dimensions
+        if given is not None:
+            if given == 1.0:
+                self.left_out("dim = 1", self.script.simul.line_of("dim"), "one dimension")
+            return 2 if given <= 2.0 else 3
+        found = 2 if any(map(self._is_flat, self.script.created)) else 3
+        self.document.note(
+            NEAREST,
+            f"{found} dimensions, since the file does not say for which Cytosim was built: --dimensions {5 - found} "
+            "for the other",
+        )
+        return found
+
+    def _is_flat(self, new):
+        # Whether a space that is created has two dimensions: a circle, or one that has two lengths.
+        if new.kind != "space":
+            return False
+        settings = self.script.named(new.name, "space", new.line).settings
+        shape = settings.text("shape", default="")
+        two = any(len(own.values("length")) == 2 and "bottom" not in own for own in (settings, new.settings))
+        return shape == "circle" or (two and shape in _WITH_EVERY_LENGTH)
+
+    def translate(self):
+        """Write all of the document."""
+        for line, text in self.script.choices:
+            self.document.note(NEAREST, text, line)
+        for line, text in self.script.stages:
+            self.left_out(text, line, "stages: what changes between runs")
+        add_solvent(self)
+        self._add_spaces()
+        add_box(self)
+        linked = []
+        for new in self.script.created:
+            if new.kind == "fiber":
+                add_filaments(self, new)
+            elif new.kind in ("single", "couple"):
+                linked.append(new)
+            elif new.kind == "event":
+                add_event(self, new)
+            elif new.kind in _BODIES:
+                new.settings.take_rest()
+                if count_of(new, self.space()):
+                    self.left_out(f"{new.kind} {new.name}", new.line, _BODIES[new.kind])
+        add_linkers(self, linked)
+        add_monomers(self, self.growings)
+        add_contacts(self)
+        add_walls(self)
+        add_simulation(self)
+        self._note_unused()
+
+    def _add_spaces(self):
+        for new in self.script.created:
+            if new.kind != "space":
+                continue
+            own = self.script.named(new.name, "space", new.line)
+            shape = own.settings.text("shape", "geometry", default="")
+            space = make_space(shape, [new.settings, own.settings], self.dimensions, self._folder)
+            if new.name not in self._spaces:
+                self._spaces[new.name] = space
+            if space is None:
+                new.settings.take_rest()
+                self.left_out(f"the space {new.name} of the shape {shape}", new.line, f"spaces: {shape}")
+
+    def _note_unused(self):
+        made = [own.name for own in self.fibers_made()]
+        every = []
+        for own in self.script.properties.values():
+            if own.kind not in _BODIES and (own.kind != "fiber" or own.name in made):
+                every.append((own.settings, own.kind))
+        every += [(new.settings, f"new {new.kind}") for new in self.script.created]
+        every += [(self.script.simul, "simul")]
+        if self.script.run is not None:
+            every.append((self.script.run, "run"))
+        for settings, kind in every:
+            self.note_unused(settings, kind)
+
+    def note_unused(self, settings, kind):
+        """Note keys of Settings that nothing here has asked for."""
+        for key, values, line in settings.unused():
+            text = f"{key} = {', '.join(values)}"[:80]
+            self.left_out(f"{text} of {settings.label}", line, _NEEDS.get((kind, key), f"{kind}: {key}"))
+
+    def check(self):
+        """Raise InputError if there is nothing that a run has."""
+        if not self.made and not self.document.tables_called("[[nucleation]]"):
+            missing = ", ".join(self.document.missing)
+            raise InputError(
+                "there are no fibers in it, and a run of ours has some"
+                + (f". It would need: {missing}." if missing else ".")
+            )
+
+
+def translate(path, stem, dimensions=None, given=None):
+    """The Translation of a file of Cytosim.
+
+    Parameters
+    ----------
+    path : str or Path
+    stem : str
+        How names of files begin that lie beside the configuration.
+    dimensions : {2, 3}, optional
+        Those of the file, or of the shape of its space, if not given.
+    given : dict, optional
+        Values of names in templates.
+
+    Raises
+    ------
+    InputError
+        If it is no such file, with the line, or has nothing that we can say.
+    """
+    try:
+        translation = Translation(read_script(path, given), Path(path).name, stem, dimensions, Path(path).parent)
+        translation.translate()
+        translation.check()
+    except InputError as error:
+        separator = ", " if str(error).startswith("line ") else ": "
+        raise InputError(f"{path}{separator}{error}") from None
+    return translation

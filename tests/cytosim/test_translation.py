@@ -1,0 +1,556 @@
+"""What becomes of each construct of Cytosim, in numbers: laws of its documentation against what our objects compute."""
+
+import math
+
+import numpy as np
+import pytest
+from openmm import unit
+
+from openmm_cylchain.cytosim.command import check, import_file
+from openmm_cylchain.cytosim.places import Draw, draw_direction, draw_inside, draw_position
+from openmm_cylchain.cytosim.settings import Settings
+from openmm_cylchain.cytosim.spaces import make_space
+from openmm_cylchain.cytosim.translation import translate
+from openmm_cylchain.errors import InputError
+from openmm_cylchain.filaments.end_states import DynamicInstability, TwoUnitCap
+from openmm_cylchain.runs.configuration import read_configuration
+from openmm_cylchain.units.quantities import BENDING_RIGIDITY, FORCE, STIFFNESS, VISCOSITY
+
+SYSTEM = "set simul system { time_step = 0.001; viscosity = 0.5; kT = 0.0042; dim = 3 }\n"
+CELL = "set space cell { shape = sphere }\nnew cell { radius = 4 }\n"
+TUBE = "set fiber tube { rigidity = 20; segmentation = 0.5 }\n"
+RUN = "run 1000 system { nb_frames = 10 }\n"
+SECOND, MICROMETER = 1e12, 1e3
+
+
+def translated(tmp_path, text, system=SYSTEM, cell=CELL, run=RUN, **options):
+    """The Configuration and the Document of a text after a system and a cell, before a run."""
+    path, output = tmp_path / "my.cym", tmp_path / "my.toml"
+    path.write_text(system + cell + text + run)
+    output.unlink(missing_ok=True)
+    for start in tmp_path.glob("*.npy"):
+        start.unlink()
+    import_file(path, output, **options)
+    document = translate(path, "my", options.get("dimensions")).document
+    assert output.read_text() == document.text()
+    return read_configuration(output), document
+
+
+def test_solvent_and_run(tmp_path):
+    found, document = translated(tmp_path, TUBE + "new tube { length = 3 }\n")
+    # kT of 4.2e-21 J, and 0.5 pN s/um^2 = 0.5 Pa s.
+    assert found.solvent.temperature == pytest.approx(4.2e-21 / 1.380649e-23, rel=1e-9)
+    pascal_seconds = 0.5 * unit.pascal * unit.second * unit.AVOGADRO_CONSTANT_NA
+    assert found.solvent.viscosity == pytest.approx(pascal_seconds.value_in_unit(VISCOSITY), rel=1e-9)
+    settings = found.simulation
+    assert (settings.time_step, settings.steps, settings.steps_per_report) == (1e9, 1000, 100)
+    assert document.missing == []
+    cold = SYSTEM.replace("kT = 0.0042", "kT = 0")
+    found, _ = translated(tmp_path, TUBE + "new tube { length = 3 }\n", cold)
+    assert found.solvent.temperature < 0.01
+
+
+@pytest.mark.parametrize(("length", "segments"), [(3.0, 6), (2.6, 5), (0.3, 1), (1.15, 2), (1.26, 3)])
+def test_a_fiber_has_the_segments_and_the_bending_of_cytosims(tmp_path, length, segments):
+    found, _ = translated(tmp_path, TUBE + f"new tube {{ length = {length} }}\n")
+    (group,) = found.filaments
+    # N minimises |length/N - segmentation|: src/sim/chain.cc.
+    assert group.segments == segments == min(range(1, 20), key=lambda n: abs(length / n - 0.5))
+    assert group.type.segment_length == pytest.approx(1e3 * length / segments)
+    rigidity = 20 * unit.piconewton * unit.micrometer**2 * unit.AVOGADRO_CONSTANT_NA
+    assert group.type.bending_rigidity == pytest.approx(rigidity.value_in_unit(BENDING_RIGIDITY))
+    assert group.type.bending_model == "kratky-porod"
+
+
+@pytest.mark.parametrize(
+    ("length", "keys", "drag"),
+    [
+        # 3 pi eta L/(ln(L/d) + 0.32), with L in the logarithm up to drag_length, src/sim/fiber.cc; eta = 0.5.
+        (3.0, "", 3 * math.pi * 0.5 * 3 / (math.log(3 / 0.025) + 0.32)),
+        (20.0, "", 3 * math.pi * 0.5 * 20 / (math.log(5 / 0.025) + 0.32)),
+        (20.0, "drag_radius = 0.005; drag_length = 2;", 3 * math.pi * 0.5 * 20 / (math.log(2 / 0.01) + 0.32)),
+        (3.0, "viscosity = 2;", 3 * math.pi * 2 * 3 / (math.log(3 / 0.025) + 0.32)),
+        (3.0, "drag_model = 1, 0.01;", 2 * math.pi * 0.5 * 3 / math.acosh(1 + 0.01 / 0.0125)),
+    ],
+)
+def test_friction_is_that_of_cytosim_along_and_across(tmp_path, length, keys, drag):
+    text = f"set fiber tube {{ rigidity = 20; segmentation = 0.5; {keys} }}\nnew tube {{ length = {length} }}\n"
+    found, _ = translated(tmp_path, text)
+    (group,) = found.filaments
+    friction = group.type.segment_friction(found.solvent.viscosity, found.solvent.temperature, group.segments)
+    expected = drag * unit.piconewton * unit.second / unit.micrometer * unit.AVOGADRO_CONSTANT_NA
+    expected = expected.value_in_unit(unit.kilojoule_per_mole * unit.picosecond / unit.nanometer**2)
+    assert group.segments * friction.parallel == pytest.approx(expected, rel=1e-6)
+    assert group.segments * friction.perpendicular == pytest.approx(expected, rel=1e-6)
+    # That of drag which is spread evenly along a segment.
+    own = expected / group.segments * group.type.segment_length**2 / 12
+    assert friction.rotational == pytest.approx(own, rel=1e-6)
+
+
+HAND = "set hand motor { binding = 10, 0.05; unbinding = 0.3, 2.5; activity = move; speed = 0.8; stall_force = 6 }\n"
+COUPLE = "set couple link { hand1 = motor; hand2 = motor; stiffness = 100; length = 0.02; diffusion = fast }\n"
+
+
+def test_hands_and_couples(tmp_path):
+    text = TUBE + HAND + COUPLE + "new 4 tube { length = 3 }\nnew 50 link\nnew 30 link { attach1 = tube }\n"
+    found, document = translated(tmp_path, text)
+    (linkers,) = found.linkers
+    (hand, other), kind = linkers.kind.hands, linkers.kind
+    assert hand == other
+    assert hand.binding_rate == pytest.approx(10 / SECOND)
+    assert hand.reach == pytest.approx(50)
+    assert hand.unbinding_rate == pytest.approx(0.3 / SECOND)
+    force = unit.piconewton * unit.AVOGADRO_CONSTANT_NA
+    assert hand.unbinding_force == pytest.approx((2.5 * force).value_in_unit(FORCE))
+    assert hand.stall_force == pytest.approx((6 * force).value_in_unit(FORCE))
+    assert hand.speed == pytest.approx(0.8 * MICROMETER / SECOND)
+    assert kind.stiffness == pytest.approx((100 * force / unit.micrometer).value_in_unit(STIFFNESS))
+    assert kind.rest_length == pytest.approx(20)
+    assert (linkers.count, linkers.bound) == (80, 30)
+    # From solution, hands bind to a length of filament at pi R^2 k/V, which is (2/3) pi R^2 k/V here.
+    volume = 4 / 3 * math.pi * 4**3 * MICROMETER**3
+    ours = hand.rate_per_length * 4 / 3 * math.pi * hand.reach**3 / linkers.volume
+    assert ours == pytest.approx(math.pi * hand.reach**2 * hand.binding_rate / volume)
+    assert document.missing == []
+
+
+def test_hands_bind_from_solution_in_the_plane(tmp_path):
+    flat = SYSTEM.replace("dim = 3", "dim = 2")
+    text = TUBE + HAND + COUPLE + "new 4 tube { length = 3 }\nnew 50 link\n"
+    found, _ = translated(tmp_path, text, flat)
+    (linkers,) = found.linkers
+    hand = linkers.kind.hands[0]
+    ours = hand.rate_per_length * 4 / 3 * math.pi * hand.reach**3 / linkers.volume
+    assert ours == pytest.approx(2 * hand.reach * hand.binding_rate / (math.pi * 4e3**2))
+    assert all(group.planar for group in found.filaments)
+
+
+@pytest.mark.parametrize(
+    ("couple", "missing"),
+    [
+        ("diffusion = 10", "linkers that diffuse by themselves"),
+        ("diffusion = fast; specificity = parallel", "rules for pairs of hands"),
+        ("diffusion = fast; trans_activated = 1", "rules for pairs of hands"),
+        ("diffusion = fast; activity = fork; torque = 1, 1", "links that hold an angle (fork)"),
+        ("diffusion = fast; confine = surface", "surfaces: linkers on one"),
+        ("diffusion = fast; glitter = 3", "couple: glitter"),
+    ],
+)
+def test_what_couples_cannot_do_here_is_said(tmp_path, couple, missing):
+    own = f"set couple link {{ hand1 = motor; hand2 = motor; stiffness = 100; {couple} }}\n"
+    found, document = translated(tmp_path, TUBE + HAND + own + "new 4 tube { length = 3 }\nnew 50 link\n")
+    assert document.missing == [missing]
+    assert len(found.linkers) == 1
+    assert "# left out" in document.text()
+
+
+@pytest.mark.parametrize(
+    ("hand", "missing"),
+    [
+        ("activity = track", "hands near ends"),
+        ("bind_only_end = plus_end", "hands near ends"),
+        ("activity = slide; mobility = 3", "hands that slip along filaments"),
+        ("activity = nucleate; nucleate = 1, tube", "hands: nucleate"),
+    ],
+)
+def test_what_hands_cannot_do_here_is_said(tmp_path, hand, missing):
+    own = f"set hand motor {{ binding = 10, 0.05; unbinding = 1, 3; {hand} }}\n"
+    _, document = translated(tmp_path, TUBE + own + COUPLE + "new 4 tube { length = 3 }\nnew 50 link\n")
+    assert document.missing == [missing]
+
+
+def test_hands_that_hold_walk_on_sites_and_bind_to_some(tmp_path):
+    text = (
+        "set fiber tube { rigidity = 20; binding_key = 1 }\nset fiber actin { rigidity = 1; binding_key = 2 }\n"
+        "set hand a { binding = 1, 0.02, 1; activity = walk; step_size = 0.008; unloaded_speed = -0.4; stall_force = 5;"
+        " hold_growing_end = 0, 1 }\nset hand b { binding = 1, 0.02; binding_key = 3; }\n"
+        "set couple link { hand1 = a; hand2 = b; stiffness = 100; diffusion = fast; min_loop = 0 }\n"
+        "new 2 tube { length = 2 }\nnew 2 actin { length = 2 }\nnew 9 link\n"
+    )
+    found, _ = translated(tmp_path, text)
+    (linkers,) = found.linkers
+    a, b = linkers.kind.hands
+    assert (a.at_end, a.site_spacing, a.binds_to, b.binds_to) == ("hold", 8.0, ("tube",), None)
+    assert a.speed == pytest.approx(-0.4 * MICROMETER / SECOND)
+    assert b.unbinding_rate == 0.0 and b.unbinding_force is None
+    assert linkers.kind.same_filament
+
+
+def test_grafted_singles_are_anchors(tmp_path):
+    text = (
+        TUBE
+        + HAND
+        + "set single grafted { hand = motor; stiffness = 100; activity = fixed }\nnew 2 tube { length = 3 }\n"
+        + "new 100 grafted ( rectangle 2 1 0.5 )\nnew grafted { position = 1 2 3 }\nnew 50 grafted\n"
+    )
+    found, document = translated(tmp_path, text)
+    (linkers,) = found.linkers
+    anchors = 1e-3 * np.array(linkers.anchors)
+    assert anchors.shape == (151, 3)
+    assert np.all(np.abs(anchors[:100]) <= [1.0, 0.5, 0.25])
+    assert np.all(anchors[:100].max(axis=0) > [0.8, 0.4, 0.2])
+    assert anchors[100].tolist() == [1.0, 2.0, 3.0]
+    assert np.all(np.linalg.norm(anchors[101:], axis=1) <= 4.0)
+    assert document.missing == []
+
+
+def test_singles_and_couples_that_stay_are_links(tmp_path):
+    text = (
+        TUBE
+        + "set hand glue { binding = 10, 0.05; unbinding = 0, inf }\n"
+        + "set single pin { hand = glue; stiffness = 50; activity = fixed }\n"
+        + "set couple joint { hand1 = glue; hand2 = glue; stiffness = 100; length = 0.1; diffusion = 1 }\n"
+        + "new tube { length = 3; position = 0 0 0; direction = 1 0 0 }\n"
+        + "new tube { length = 2; position = 0 1 0; direction = X }\n"
+        + "new pin { position = 0 0 1; attach = tube1, 1.5 }\n"
+        + "new joint { attach1 = last-1, 0; attach2 = last, 0.5, plus_end }\n"
+        + "new joint { attach1 = fiber1, 0, plus_end; attach2 = fiber2, 0.25, center }\n"
+    )
+    found, document = translated(tmp_path, text)
+    pin, first, second = found.links
+    assert pin.between[0]["arc_length"] == pytest.approx(1500)
+    assert pin.between[1]["point"] == (0.0, 0.0, 1000.0)
+    assert pin.rest_length == 0.0 and first.rest_length == pytest.approx(100)
+    assert (first.between[0]["filament"], first.between[0]["node"]) == (0, 0)
+    assert (first.between[1]["filament"], first.between[1]["arc_length"]) == (1, 1500.0)
+    assert (second.between[0]["node"], second.between[1]["arc_length"]) == (-1, 1250.0)
+    assert not found.linkers
+    assert document.missing == []
+
+
+def test_what_begins_bound_and_may_unbind_is_said(tmp_path):
+    text = TUBE + HAND + COUPLE + "new tube { length = 3 }\nnew link { attach1 = tube1, 1; attach2 = tube1, 2 }\n"
+    _, document = translated(tmp_path, text)
+    assert document.missing == ["linkers that begin bound at given places"]
+
+
+def test_fibers_that_are_held_at_their_ends_and_pulled(tmp_path):
+    text = (
+        "set hand glue { unbinding = 0, inf }\nset single pin { hand = glue; stiffness = 50; activity = fixed }\n"
+        "set fiber tube { rigidity = 20; segmentation = 0.5; end_force = plus_end, 0 2 0 }\n"
+        "new 3 tube { length = 3; attach1 = pin, 0, minus_end }\n"
+    )
+    found, document = translated(tmp_path, text)
+    (tether,), (pull,) = found.tethers, found.pulls
+    assert (tether.filaments, tether.node, tether.point) == ((0, 1, 2), 0, None)
+    assert (pull.filaments, pull.node) == ((0, 1, 2), -1)
+    newton = unit.piconewton * unit.AVOGADRO_CONSTANT_NA
+    assert pull.force == pytest.approx((0.0, (2 * newton).value_in_unit(FORCE), 0.0))
+    assert document.missing == []
+
+
+@pytest.mark.parametrize(
+    ("activity", "state", "plus", "minus", "kind"),
+    [
+        ("grow; growing_speed = 0.2, 0.1; growing_off_speed = -0.05", "plus_end = grow", (0.2, 0.05), None, None),
+        ("grow; growing_speed = 0.2, 0.1", "end_state = 1, green", (0.2, 0.0), (0.1, 0.0), None),
+        ("treadmill; growing_speed = 0.2; shrinking_speed = 0, -0.1", "end_state = 1, 4", (0.2, 0.0), (0.0, 0.1), None),
+        (
+            "classic; growing_speed = 0.2; shrinking_speed = -0.4; catastrophe_rate = 0.02; rescue_rate = 0.1",
+            "plus_end = grow",
+            (0.2, 0.0),
+            None,
+            DynamicInstability,
+        ),
+        (
+            "dynamic; unit_length = 0.01; growing_speed = 0.2; shrinking_speed = -0.4; hydrolysis_rate = 0.3",
+            "plus_end = grow",
+            (0.2, 0.0),
+            None,
+            TwoUnitCap,
+        ),
+    ],
+)
+def test_growth_has_the_speeds_of_cytosim(tmp_path, activity, state, plus, minus, kind):
+    own = "set fiber tube { rigidity = 20; segmentation = 0.5; min_length = 0.1; growing_force = 1.7; "
+    own += f"activity = {activity} }}\n"
+    found, document = translated(tmp_path, own + f"new 3 tube {{ length = 2; {state} }}\n")
+    (group,) = found.filaments
+    growth = group.growth
+    length = growth.monomers.length
+    for end, expected in (("plus", plus), ("minus", minus)):
+        on, off = growth.rates(end)
+        speeds = [on * growth.pool.concentration * length, off * length]
+        assert speeds == pytest.approx([own * MICROMETER / SECOND for own in expected or (0.0, 0.0)], abs=1e-16)
+        assert getattr(growth, f"{end}_capped") == (expected is None)
+    force = 1.7 * unit.piconewton * unit.AVOGADRO_CONSTANT_NA
+    assert growth.growing_force == pytest.approx(force.value_in_unit(FORCE))
+    assert growth.deterministic == (kind is not TwoUnitCap)
+    assert growth.vanishes == ("shrink" in activity or "off" in activity)
+    turns = growth.plus_instability
+    assert kind is None or isinstance(turns, kind)
+    if kind is DynamicInstability:
+        rates = (turns.catastrophe_rate, turns.rescue_rate, turns.shrinking_off_rate * length)
+        assert rates == pytest.approx((0.02 / SECOND, 0.1 / SECOND, 0.4 * MICROMETER / SECOND))
+    if kind is TwoUnitCap:
+        assert length == pytest.approx(10)
+        rates = (turns.hydrolysis_rate, turns.shrinking_off_rate * length)
+        assert rates == pytest.approx((0.3 / SECOND, 0.4 * MICROMETER / SECOND))
+    assert growth.longest == pytest.approx(2e3 + 1.05 * 0.2e3 * 1.0, rel=0.1)
+    assert document.missing == []
+
+
+def test_fibers_share_a_pool_of_polymer(tmp_path):
+    own = "set fiber tube { rigidity = 20; activity = grow; growing_speed = 0.5; total_polymer = 40; max_length = 9 }\n"
+    found, _ = translated(
+        tmp_path, own + "new 3 tube { length = 2; plus_end = grow }\nnew tube { length = 4; plus_end = grow }\n"
+    )
+    pools = {id(group.growth.pool): group.growth.pool for group in found.filaments}
+    (pool,) = pools.values()
+    growth = found.filaments[0].growth
+    length, on = growth.monomers.length, growth.monomers.plus_on_rate
+    # growing_speed * (1 - sum(length)/total_polymer), at first and when all of it is free.
+    assert on * pool.concentration * length == pytest.approx(0.5 * (1 - 10 / 40) * MICROMETER / SECOND)
+    whole = pool.concentration + 10e3 / length / pool.volume
+    assert on * whole * length == pytest.approx(0.5 * MICROMETER / SECOND)
+    assert growth.longest == pytest.approx(min(9e3, 2e3 + 1.05 * 500), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("keys", "state", "missing"),
+    [
+        (
+            "activity = classic; catastrophe_rate = 0.1; catastrophe_rate_stalled = 1",
+            "plus_end = grow",
+            "depend on load",
+        ),
+        ("activity = classic; catastrophe_rate = 0.1", "plus_end = shrink", "begin by shrinking"),
+        ("activity = classic; catastrophe_rate = 0.1, 0.1", "end_state = grow, grow", "minus ends that turn"),
+        ("activity = classic; persistent = 1; rebirth_rate = 1", "plus_end = grow", "rebirth"),
+        ("activity = vector_growth", "plus_end = grow", "growth: vector_growth"),
+    ],
+)
+def test_what_ends_cannot_do_here_is_said(tmp_path, keys, state, missing):
+    own = f"set fiber tube {{ rigidity = 20; growing_speed = 0.5; shrinking_speed = -1; {keys} }}\n"
+    _, document = translated(tmp_path, own + f"new 3 tube {{ length = 2; {state} }}\n")
+    assert len(document.missing) == 1 and missing in document.missing[0]
+
+
+def test_static_ends_do_not_grow(tmp_path):
+    own = "set fiber tube { rigidity = 20; activity = grow; growing_speed = 0.5 }\n"
+    found, document = translated(tmp_path, own + "new 3 tube { length = 2 }\n")
+    assert found.filaments[0].growth is None
+    assert document.missing == []
+
+
+def test_events_begin_fibers(tmp_path):
+    own = "set fiber tube { rigidity = 20; activity = grow; growing_speed = 0.5 }\n"
+    event = "new event { rate = 3; code = ( new tube { length = 0.5; plus_end = grow; position = ball 2; } ) }\n"
+    found, document = translated(tmp_path, own + event)
+    (group,) = found.filaments
+    assert group.is_reserve
+    assert group.nucleation.rate == pytest.approx(3 / SECOND)
+    assert group.nucleation.length == pytest.approx(500, rel=0.02)
+    assert document.missing == []
+    _, document = translated(tmp_path, TUBE + "new tube\nnew event { rate = 3; code = ( delete 1 tube ) }\n")
+    assert document.missing == ["events during a run"]
+    _, document = translated(tmp_path, TUBE + "new tube\nnew event { delay = 3; code = (report fiber x.txt {a=1}) }\n")
+    assert document.missing == []
+
+
+def test_walls_contacts_and_boxes(tmp_path):
+    system = SYSTEM.replace("dim = 3", "dim = 3; steric = 1, 500")
+    own = "set fiber tube { rigidity = 20; confine = inside, 200; steric = 1, 0.01 }\nnew 3 tube { length = 2 }\n"
+    found, document = translated(tmp_path, own, system)
+    (wall,) = found.walls
+    stiffness = unit.piconewton / unit.micrometer * unit.AVOGADRO_CONSTANT_NA
+    assert wall.stiffness == pytest.approx((200 * stiffness).value_in_unit(STIFFNESS))
+    assert wall.shape.radius == 4000
+    assert found.contacts.diameter == 20
+    assert found.contacts.stiffness == pytest.approx((500 * stiffness).value_in_unit(STIFFNESS))
+    assert document.missing == []
+    periodic = "set space cell { shape = periodic }\nnew cell { length = 5, 6, 7 }\n"
+    found, _ = translated(tmp_path, TUBE + "new 3 tube { length = 2 }\n", cell=periodic)
+    assert found.box == (5000.0, 6000.0, 7000.0)
+    capsule = "set space cell { shape = capsule }\nnew cell { length = 8; radius = 1 }\n"
+    _, document = translated(tmp_path, own, cell=capsule)
+    assert document.missing == ["walls: capsule"]
+
+
+def test_two_dimensions_are_found(tmp_path):
+    system, tube = SYSTEM.replace("; dim = 3", ""), TUBE + "new 3 tube { length = 2 }\n"
+    for shape, size, planar in (
+        ("circle", "radius = 4", True),
+        ("sphere", "radius = 4", False),
+        ("rectangle", "length = 8, 8", True),
+        ("rectangle", "length = 8, 8, 8", False),
+    ):
+        cell = f"set space cell {{ shape = {shape} }}\nnew cell {{ {size} }}\n"
+        found, document = translated(tmp_path, tube, system, cell)
+        assert {group.planar for group in found.filaments} == {planar}
+        assert any("--dimensions" in note.text for note in document.notes)
+    found, document = translated(tmp_path, tube, system, cell, dimensions=2)
+    assert found.filaments[0].planar and not any("--dimensions" in note.text for note in document.notes)
+
+
+def test_stages_and_bodies_are_said(tmp_path):
+    text = TUBE + "new tube\nset bead ball { confine = off }\nnew 3 ball { radius = 1 }\nrun 5000 system\nnew tube\n"
+    _, document = translated(tmp_path, text)
+    assert document.missing == ["stages: what changes between runs", "bodies: beads"]
+
+
+def test_fibers_begin_where_they_are_told_to(tmp_path):
+    text = TUBE + (
+        "new tube { length = 2; position = 1 0 0; direction = 0 1 0 }\n"
+        "new tube { length = 2; position = 1 0 0; direction = 0 1 0; reference = minus_end }\n"
+        "new 3 tube { length = 2; range = -1 0 0, 1 0 0; orientation = 0 0 2 }\n"
+        "new tube { position_ends = 0 0 0, 0 0 3 }\n"
+        "new tube { shape = 0 0 0, 1 0 0, 1 1 0; placement = off }\n"
+        "new 200 tube { length = 1, 0.5; direction = parallel X }\n"
+    )
+    found, _ = translated(tmp_path, text)
+    first, second, row, ends, bent, *many = found.filaments
+    assert first.position == (1000.0, -1000.0, 0.0) and second.position == (1000.0, 0.0, 0.0)
+    assert [start[0].tolist() for start in row.positions] == [[x, 0.0, -1000.0] for x in (-1000.0, 0.0, 1000.0)]
+    assert [start[-1][2] for start in row.positions] == [1000.0] * 3
+    assert ends.position == (0.0, 0.0, 0.0) and ends.segments * ends.type.segment_length == pytest.approx(3000)
+    assert bent.segments == 4 and len(bent.positions[0]) == 5
+    assert sum(group.count for group in many) == 200
+    lengths = [group.segments * group.type.segment_length for group in many]
+    assert np.average(lengths, weights=[group.count for group in many]) == pytest.approx(1000, rel=0.01)
+    assert all(group.orientation == "nematic" for group in many)
+
+
+def test_long_fibers_begin_as_cytosim_has_them(tmp_path):
+    # Their middles are in the space, while their ends are not.
+    found, _ = translated(tmp_path, TUBE + "new 40 tube { length = 12 }\n")
+    (group,) = found.filaments
+    nodes = np.array(group.positions)
+    assert nodes.shape == (40, 25, 3)
+    assert np.all(np.linalg.norm(nodes[:, 12], axis=1) < 4000)
+    steps = np.linalg.norm(np.diff(nodes, axis=1), axis=2)
+    assert np.allclose(steps, 500)
+
+
+SHAPES = [
+    ("sphere", "radius = 2", 3),
+    ("circle", "diameter = 3", 2),
+    ("rectangle", "length = 2, 3, 4", 3),
+    ("capsule", "length = 6; radius = 1", 3),
+    ("capsule", "length = 6; radius = 1", 2),
+    ("ellipse", "length = 2, 3, 4", 3),
+    ("cylinder", "length = 4; radius = 1", 3),
+    ("cylinderZ", "bottom = -1; top = 2; radius = 1", 3),
+    ("torus", "curvature = 3; width = 1", 3),
+    ("torus", "curvature = 3; width = 1", 2),
+    ("annulus", "inner = 1; outer = 2", 2),
+    ("annulus", "radius = 2; width = 1; bottom = 0; top = 3", 3),
+    ("dice", "length = 2, 2, 2; edge = 0.5", 3),
+    ("polygon", "points = 0 0, 3 0, 3 1, 1 1, 1 3, 0 3", 2),
+    ("polygon", "order = 6; radius = 2; height = 2", 3),
+    ("strip", "length = 3, 4, 1", 3),
+]
+
+
+@pytest.mark.parametrize(("shape", "sizes", "dimensions"), SHAPES)
+def test_volumes_of_spaces_are_those_of_what_is_inside(shape, sizes, dimensions):
+    settings = Settings("space", 1)
+    for part in sizes.split(";"):
+        key, _, values = part.partition("=")
+        settings.set(key.strip(), [own.strip() for own in values.split(",")], 1)
+    space = make_space(shape, [settings], dimensions)
+    generator, count = np.random.default_rng(3), 200_000
+    places = space.middle + space.half * generator.uniform(-1.2, 1.2, (count, 3))
+    around = float(np.prod(2.4 * space.half[:dimensions]))
+    inside = space.inside(places)
+    if space.edges:
+        # What repeats has no end of its own.
+        inside &= np.all(np.abs(places - space.middle) <= space.half, axis=-1)
+    share = float(np.mean(inside))
+    error = around * math.sqrt(share * (1 - share) / count)
+    assert abs(around * share - space.volume) < 4 * error
+    assert error < 0.01 * space.volume
+    drawn = np.array([space.draw(generator) for _ in range(200)])
+    assert np.all(space.inside(drawn))
+
+
+def draw_of(dimensions, space=None):
+    return Draw(space, dimensions, np.random.default_rng(5), 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "dimensions", "expected"),
+    [
+        # Mean and variance along each axis.
+        ("1 2 3", 3, [(1, 0), (2, 0), (3, 0)]),
+        ("ball 2", 3, [(0, 4 / 5)] * 3),
+        ("ball 2 at 1 0 0", 2, [(1, 1), (0, 1), (0, 0)]),
+        ("disc 2 0.6", 3, [(0, 1), (0, 1), (0, 0.36 / 12)]),
+        ("discYZ 2 0.6", 3, [(0, 0.36 / 12), (0, 1), (0, 1)]),
+        ("rectangle 2 1 0.5", 3, [(0, 4 / 12), (0, 1 / 12), (0, 0.25 / 12)]),
+        ("sphere 2", 3, [(0, 4 / 3)] * 3),
+        ("circle 2", 2, [(0, 2), (0, 2), (0, 0)]),
+        ("cylinder 4 2", 3, [(0, 16 / 12), (0, 1), (0, 1)]),
+        ("ring 4 2", 3, [(0, 16 / 12), (0, 2), (0, 2)]),
+        ("equator 2 1", 3, [(0, 2), (0, 2), (0, 1 / 12)]),
+        ("line 4 0", 3, [(0, 16 / 12), (0, 0), (0, 0)]),
+        ("square 2", 2, [(0, 4 / 12), (0, 4 / 12), (0, 0)]),
+        ("0 0 0 to 2 0 0", 3, [(1, 4 / 12), (0, 0), (0, 0)]),
+        ("1 0 0 or -1 0 0", 3, [(0, 1), (0, 0), (0, 0)]),
+        ("1 0 0 blur 0.5", 2, [(1, 0.25), (0, 0.25), (0, 0)]),
+        ("2 0 0 turn degree 90", 3, [(0, 0), (2, 0), (0, 0)]),
+        ("line 2 0 align 0 1 0", 2, [(0, 0), (0, 4 / 12), (0, 0)]),
+        ("center add ball 2", 3, [(0, 4 / 5)] * 3),
+    ],
+)
+def test_positions_have_the_means_and_variances_of_their_shapes(text, dimensions, expected):
+    draw, count = draw_of(dimensions), 4000
+    places = np.array([draw_position(text, draw) for _ in range(count)])
+    for values, (mean, variance) in zip(places.T, expected):
+        deviations = (values - mean) ** 2
+        assert abs(np.mean(values) - mean) <= 4 * math.sqrt(variance / count) + 1e-9
+        error = np.std(deviations) / math.sqrt(count)
+        assert abs(np.mean(deviations) - variance) <= 4 * error + 1e-9
+        assert error <= 0.05 * variance + 1e-9
+
+
+def test_positions_in_spaces():
+    settings = Settings("space", 1)
+    settings.set("radius", ["3"], 1)
+    draw = draw_of(3, make_space("sphere", [settings], 3))
+    flat = np.array([draw_inside("XY 1", draw) for _ in range(200)])
+    assert np.all(flat[:, 2] == 1.0) and np.all(np.linalg.norm(flat, axis=1) <= 3)
+    rising = np.array([draw_inside("gradient -3 3", draw)[0] for _ in range(2000)])
+    # Of the density (x + 3)(9 - x^2): its mean is the ratio of the integrals of x^2 (9 - x^2) and of 3 (9 - x^2).
+    assert abs(rising.mean() - 0.6) < 4 * rising.std() / math.sqrt(len(rising))
+    assert draw_inside("rectangle 0.1 0.1 0.1 at 9 0 0", draw) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "of"),
+    [
+        ("X", lambda v, at: abs(v[0] - 1)),
+        ("0 2 0", lambda v, at: abs(v[1] - 1)),
+        ("horizontal", lambda v, at: abs(abs(v[0]) - 1)),
+        ("parallel 0 1 0", lambda v, at: abs(abs(v[1]) - 1)),
+        ("orthogonal 0 0 1", lambda v, at: abs(v[2])),
+        ("parallel XY", lambda v, at: abs(v[2])),
+        ("radial", lambda v, at: abs(v @ at / np.linalg.norm(at) - 1)),
+        ("antiradial", lambda v, at: abs(v @ at / np.linalg.norm(at) + 1)),
+        ("circular", lambda v, at: abs(v @ at)),
+        ("1 0 0 or 0 1 0", lambda v, at: abs(v[0] + v[1] - 1)),
+        (None, lambda v, at: 0.0),
+    ],
+)
+def test_directions(text, of):
+    draw, at = draw_of(3), np.array([1.0, 2.0, 0.5])
+    vectors = np.array([draw_direction(text, at, draw) for _ in range(500)])
+    assert np.allclose(np.linalg.norm(vectors, axis=1), 1.0)
+    assert max(of(vector, at) for vector in vectors) < 1e-9
+    if text is None:
+        assert np.allclose(vectors.mean(axis=0), 0.0, atol=4 / math.sqrt(3 * 500))
+
+
+def test_unknown_places_and_directions_are_said(tmp_path):
+    text = TUBE + "new 3 tube { length = 1; position = moebius 3 }\nnew tube { length = 1; direction = sideways }\n"
+    _, document = translated(tmp_path, text)
+    assert document.missing == ["positions: moebius", "directions: sideways"]
+
+
+def test_what_a_run_refuses_is_said_with_the_line_of_cytosims_file(tmp_path):
+    path = tmp_path / "my.cym"
+    path.write_text(SYSTEM + CELL + TUBE + "new tube { length = 3 }\n" + RUN)
+    translation = translate(path, "my")
+    text = translation.document.text().replace('"kratky-porod"', '"bent"')
+    with pytest.raises(InputError, match=r"my.cym, line 5: what becomes of this cannot be run: .*bending_model"):
+        check(translation, text, path)
