@@ -149,25 +149,19 @@ def _add_hand(force, hand, filaments, name):
     force.setHandWalking(number, hand.speed, hand.stall_force or 0.0, hand.walks_backward, hand.at_end == "hold")
     force.setHandSiteSpacing(number, hand.site_spacing or 0.0)
     if hand.filament_end is not None:
-        _set_hand_at_end(force, number, hand.filament_end, [filaments[i] for i in chains], name)
+        _set_hand_at_end(force, number, hand, filaments, name)
     return number
 
 
-def _set_hand_at_end(force, number, own, filaments, name):
-    growths = {id(one.growth): one.growth for one in filaments if one.growth is not None}.values()
-    if not growths:
-        raise InputError(f"Linkers {name!r}: a hand has to do with ends, but binds to no filaments that grow.")
-    states = {(-1, -1)}
-    if own.changes is not None:
-        with_both = [growth.states(own.end) for growth in growths]
-        with_both = [one for one in with_both if set(own.changes) <= set(one.names)]
-        states = {(one.find(own.changes[0]), one.find(own.changes[1])) for one in with_both}
-        if len(states) != 1:
-            raise InputError(
-                f"Linkers {name!r}: a hand changes {own.end} ends from {own.changes[0]!r} to {own.changes[1]!r}, which "
-                f"{'no filament has' if not states else 'have different numbers in EndStates of several filaments'}."
-            )
-    ((free, held),) = states
+def _set_hand_at_end(force, number, hand, filaments, name):
+    own, growing = hand.filament_end, [one for one in filaments if one.growth is not None]
+    # Many filaments share a growth.
+    every = {id(one.growth): one.growth for one in growing}
+    bound = {id(one.growth): one.growth for one in growing if hand.binds(one.type)}
+    try:
+        free, held = own.find_changes(bound.values(), every.values())
+    except InputError as error:
+        raise InputError(f"Linkers {name!r}: {error}") from None
     force.setHandAtEnd(number, int(own.end == "plus"), own.range, own.binds_there, own.tracks, free, held)
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from ..filaments.end_states import ENDS
+from ..filaments.growth import Growth
 from ..units.quantities import LENGTH, one_of, positive, shown, true_or_false
 from ..units.types import Scalar
 
@@ -72,3 +73,28 @@ class HandAtEnd:
                     f"HandAtEnd: changes must be the names of two different states, but is {shown(self.changes)}."
                 )
             object.__setattr__(self, "changes", names)
+
+    def find_changes(self, bound: Iterable[Growth], every: Iterable[Growth]) -> tuple[int, int]:
+        """The numbers of both states of ``changes`` among those of the ends to which it binds; -1 without changes.
+
+        InputError if none of these has such states, or if any other end has states of these numbers.
+        """
+        states = [growth.states(self.end).names for growth in bound]
+        if not states:
+            raise InputError("a hand has to do with ends, but binds to no filaments that grow.")
+        if self.changes is None:
+            return -1, -1
+        what = f"a hand changes {self.end} ends from {self.changes[0]!r} to {self.changes[1]!r}"
+        with_both = next((names for names in states if set(self.changes) <= set(names)), None)
+        if with_both is None:
+            known = " or ".join(dict.fromkeys(", ".join(names) for names in states))
+            raise InputError(f"{what}, but the states are {known}.")
+        free, held = (with_both.index(name) for name in self.changes)
+        # An end is known to the engine by the numbers of its states.
+        for names in (growth.states(self.end).names for growth in every):
+            if max(free, held) < len(names) and (names[free], names[held]) != self.changes:
+                raise InputError(
+                    f"{what}, their states {free} and {held}: those of all filaments that grow must be these, but "
+                    f"others have {', '.join(names)}. Put these two behind so many others, or leave the others out."
+                )
+        return free, held

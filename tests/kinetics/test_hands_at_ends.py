@@ -119,7 +119,7 @@ def test_a_system_keeps_what_hands_do_at_ends():
         (lambda: HandAtEnd(end="plus", range=1.0, changes=("free",)), "two different states"),
         (lambda: HandAtEnd(end="plus", range=1.0, tracks=1.0), "tracks"),
         (lambda: Hand(binding_rate=1.0, reach=1.0, unbinding_rate=1.0, filament_end="plus"), "filament_end"),
-        (lambda: system_with(formin(changes=("free", "slow")), states(20.0, 4.0)), "no filament has"),
+        (lambda: system_with(formin(changes=("free", "slow")), states(20.0, 4.0)), "but the states are free, held"),
     ],
 )
 def test_wrong_ends_are_refused(make, message):

@@ -179,7 +179,7 @@ def test_aging(aging, message):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"name": 3}, "name of a MonomerState"),
+        ({"name": 3}, "The name of a state"),
         ({"rate": NAN}, "old: rate must be finite"),
         ({"plus_off_rate": -1.0}, "old: plus_off_rate cannot be negative"),
         ({"plus_on_rate": 1 * SECOND}, "old: plus_on_rate has the unit second"),
