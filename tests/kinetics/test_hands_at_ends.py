@@ -8,6 +8,7 @@ from openmm import unit
 from openmm_cylchain import (
     F_ACTIN,
     Crosslinker,
+    DynamicInstability,
     EndStates,
     Filaments,
     Growth,
@@ -125,6 +126,39 @@ def test_a_system_keeps_what_hands_do_at_ends():
 def test_wrong_ends_are_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_other_ends_with_states_of_these_numbers_are_refused():
+    """The engine knows states by their numbers; those behind all others are no others' states."""
+    turning = DynamicInstability(catastrophe_rate=1.0, rescue_rate=1.0, shrinking_off_rate=1.0)
+    own, other = (
+        Growth(monomers=Monomers(length=2.7), pool=1e-4, longest=1200.0, plus_instability=plus)
+        for plus in (states(20.0, 4.0), turning)
+    )
+    hand = formin().filament_end
+    assert hand.find_changes([own], [own]) == (0, 1)
+    with pytest.raises(InputError, match="others have growing, shrinking"):
+        hand.find_changes([own], [own, other])
+    three = EndStates(
+        on_rates=[1, 1, 1], off_rates=[0, 0, 0], switch_rates=np.zeros((3, 3)), names=["free", "odd", "held"]
+    )
+    last = Growth(monomers=Monomers(length=2.7), pool=1e-4, longest=1200.0, plus_instability=three)
+    assert hand.find_changes([last], [last, other]) == (0, 2)
+
+
+def test_reserves_have_no_tethers():
+    filaments = Filaments(viscosity=1e-3 * unit.pascal * unit.second, temperature=298.0)
+    monomers = Monomers(length=2.7, plus_on_rate=PER_CONCENTRATION)
+    growth, vanishing = (
+        Growth(monomers=monomers, pool=1e-4, longest=1200.0, minus_capped=True, vanishes=vanishes)
+        for vanishes in (False, True)
+    )
+    filaments.add_straight(ACTIN, 4, [0, 0, 0], [1, 0, 0], growth=vanishing)
+    filaments.add_reserve(ACTIN, 1, growth=growth)
+    with pytest.raises(InputError, match="if it does not vanish"):
+        filaments.add_tether(0, 0, [0, 0, 0], 0.5)
+    with pytest.raises(InputError, match="its nodes come and go"):
+        filaments.add_tether(1, 0, [0, 0, 0], 0.5)
 
 
 def test_the_first_node_of_a_capped_end_has_a_tether():
