@@ -290,7 +290,7 @@ def test_tables_say_what_comes_and_goes(directory):
     assert {"new", "ADP"} <= set(table["plus end state"][:, :6][there[:, :6]]) <= {"new", "ADP-Pi", "ADP"}
     # Curves of those that are not there have no points.
     run = analysis.load(directory)
-    curves = analysis.filament_curves(run.trajectory())
+    curves = analysis.filament_curves(run.mdtraj())
     assert np.array_equal(np.array([np.isfinite(own).all(axis=(1, 2)) for own in curves]).T, there)
     energies = np.loadtxt(directory / "energies.csv", delimiter=",", skiprows=1)
     assert np.all(np.isfinite(energies))
