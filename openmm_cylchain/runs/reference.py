@@ -4,7 +4,7 @@ python -m openmm_cylchain.runs.reference > docs/configuration.md
 """
 
 from .configuration import TABLES
-from .keys import REQUIRED, Choice, Listing
+from .keys import REQUIRED, Choice, Either, Listing
 from .table import TableKind
 
 _INTRODUCTION = """# The file of a run
@@ -79,7 +79,8 @@ def _written(value):
 
 def _tables_in(key):
     # Of a list, the table that its items are.
-    kind = key.kind.kind if isinstance(key.kind, Listing) else key.kind
+    kind = key.kind.kinds[0][1] if isinstance(key.kind, Either) else key.kind
+    kind = kind.kind if isinstance(kind, Listing) else kind
     table = getattr(kind, "table", None)
     if isinstance(table, TableKind):
         yield key.name, table

@@ -6,7 +6,7 @@ import numpy as np
 import openmm
 import pytest
 
-from openmm_cylchain import ACTIN_ATP, DynamicInstability, HandAtEnd, InputError, TwoUnitCap, analysis
+from openmm_cylchain import ACTIN_ATP, MDIA1_ENDS, DynamicInstability, HandAtEnd, InputError, TwoUnitCap, analysis
 from openmm_cylchain.cli import main
 from openmm_cylchain.output.read_tables import read_reports
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration
@@ -75,6 +75,15 @@ def test_what_is_read_is_that_of_python():
     assert per_second([cap.hydrolysis_rate, cap.shrinking_off_rate]) == pytest.approx([0.4, 56.0])
 
 
+def test_a_preset_has_the_critical_concentration_of_free_ends():
+    """With mDia1, an end grows nine tenths as fast, and stands still where a free one does."""
+    own = parse('plus_states = "MDIA1_ENDS"').filaments[0].growth.states("plus")
+    assert own is MDIA1_ENDS and own.on_rates[0] == ACTIN_ATP.plus_on_rate
+    assert own.on_rates[1] == pytest.approx(0.9 * own.on_rates[0], rel=1e-12, abs=0.0)
+    ratios = np.array(own.off_rates) / own.on_rates
+    np.testing.assert_allclose(ratios, ACTIN_ATP.plus_off_rate / ACTIN_ATP.plus_on_rate)
+
+
 def test_changes_are_named():
     first, second = parse(FORMIN), parse(FORMIN.replace('"3 ', '"2 '))
     assert changed_keys(first, first) == [] and changed_keys(first, second) == ["[[filament]] number 1: growth"]
@@ -93,6 +102,7 @@ CAPPED = "minus_capped = true"
     ("message", "keys", "tables", "parts"),
     [
         ("growth plus_states must be a list of tables", "plus_states = []", (), {}),
+        ("plus_states must be one of MDIA1_ENDS, but is 'mDia1'", "plus_states = 'mDia1'", (), {}),
         ("plus_states[0] lacks the key 'name'", 'plus_states = [{ off_rate = "1 1/s" }]', (), {}),
         (
             "plus_states[0] has an unknown key 'onrate'. Did you mean 'on_rate'?",

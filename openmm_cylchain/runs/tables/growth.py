@@ -3,11 +3,15 @@
 from ...engine_choice import choose_engine
 from ...filaments.end_states import ENDS, DynamicInstability, EndStates, TwoUnitCap
 from ...filaments.growth import Growth, Severing
+from ...filaments.presets import MDIA1_ENDS
 from ...time_steps.schemes import IMPLICIT_SCHEMES
 from ...units import quantities as units
-from ..keys import REQUIRED, Flag, Inline, Key, Listing, Named, Quantity, Text, close_match
+from ..keys import REQUIRED, Choice, Either, Flag, Inline, Key, Listing, Named, Quantity, Text, close_match
 from ..table import TableKind
 from .couplings import group_of
+
+PRESETS = {"MDIA1_ENDS": MDIA1_ENDS}
+"""States of ends by the names that a configuration uses."""
 
 _INSTABILITY = ("catastrophe_rate", "rescue_rate", "shrinking_off_rate")
 _TURNING = ("catastrophe_rate", "hydrolysis_rate", "rescue_rate", "shrinking_off_rate", "shrinking_on_rate")
@@ -38,14 +42,7 @@ _STATE = TableKind(
 )
 
 
-def _states_key(end, which):
-    return Key(
-        f"{end}_states",
-        Listing(Inline(_STATE, _STATE_EXAMPLE), "tables", f"[{_STATE_EXAMPLE}]"),
-        None,
-        f"In place of these, states of your own of the end at the {which} node, the first one first.",
-    )
-
+_STATES = Listing(Inline(_STATE, _STATE_EXAMPLE), "tables", f"[{_STATE_EXAMPLE}]")
 
 _RATE = Quantity(units.RATE, "zero")
 GROWTH = TableKind(
@@ -82,8 +79,13 @@ GROWTH = TableKind(
         Key("minus_rescue_rate", _RATE, None, "At which the minus end begins to grow again."),
         Key("minus_shrinking_off_rate", _RATE, None, "How many monomers the minus end loses while it shrinks."),
         Key("minus_shrinking_on_rate", Quantity(units.ON_RATE, "zero"), None, "k_on of the minus end, likewise."),
-        _states_key("plus", "last"),
-        _states_key("minus", "first"),
+        Key(
+            "plus_states",
+            Either(((list, _STATES), (object, Choice(tuple(PRESETS))))),
+            None,
+            "In place of these, states of your own of the plus end, the first one first; or a preset.",
+        ),
+        Key("minus_states", _STATES, None, "States of your own of the minus end."),
         Key(
             "deterministic",
             Flag(),
@@ -160,6 +162,8 @@ def _instability(entries, end, monomers):
     if entries[f"{end}_capped"]:
         raise first.error(f"cannot be with {end}_capped = true: leave one of them out.")
     if states in entries:
+        if isinstance(entries[states], str):
+            return PRESETS[entries[states]]
         return _states(entries[states], *(getattr(monomers, f"{end}_{which}_rate") for which in ("on", "off")))
     if "hydrolysis_rate" in given:
         others = [prefix + name for name in ("catastrophe_rate", "shrinking_on_rate")]
