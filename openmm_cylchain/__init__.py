@@ -42,7 +42,7 @@ from .filaments.end_states import DynamicInstability, EndStates, TwoUnitCap
 from .filaments.filament import Filament, Tether
 from .filaments.filament_type import FilamentType
 from .filaments.growth import Growth, MonomerPool, Monomers, MonomerState
-from .filaments.presets import ACTIN_AGING, ACTIN_ATP, DSDNA, F_ACTIN, MICROTUBULE, TUBULIN
+from .filaments.presets import ACTIN_AGING, ACTIN_ATP, DSDNA, F_ACTIN, MDIA1_ENDS, MICROTUBULE, TUBULIN
 from .filaments.segment_place import SegmentPlace
 from .filaments.severing import Severing
 from .filaments.shapes import FilamentOptions
@@ -123,6 +123,7 @@ __all__ = [
     "GrowthReporter",
     "InputError",
     "InstabilityError",
+    "MDIA1_ENDS",
     "MICROTUBULE",
     "MYOSIN_II",
     "MonomerPool",

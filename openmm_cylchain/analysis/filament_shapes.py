@@ -70,13 +70,16 @@ def filament_curves(trajectory: mdtraj.Trajectory, filaments: int | Indices | No
     """Points by which filaments are drawn: nodes, or of beam elements eight along the curve of each and the last node.
 
     Those of a ring end before its first point, to which the last one is joined. Spare nodes of a filament that grows
-    are where its last node is.
+    are where its last node is; one that is not there has NaN.
 
     Returns
     -------
     list of (frames, points, 3) arrays in nm
     """
-    return _curves(_particles(trajectory, filaments), trajectory, filaments)
+    particles = [
+        np.where(count_nodes(own)[:, None, None] == 0, np.nan, own) for own in _particles(trajectory, filaments)
+    ]
+    return _curves(particles, trajectory, filaments)
 
 
 def _curves(particles, trajectory, filaments):

@@ -34,6 +34,12 @@ def as_tuple(values: Any, name: str) -> tuple[Any, ...]:
     raise InputError(f"{name} must be a sequence, but is {shown(values)}.")
 
 
+def check_state_name(name: Any) -> None:
+    """InputError unless a name of a state can stand in a table of comma-separated values."""
+    if not isinstance(name, str) or not name or not name.isprintable() or set(name) & set(',"'):
+        raise InputError(f"The name of a state must be a text without commas and quotes, but is {shown(name)}.")
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EndStates:
     """What an end does in each of its states, and how it goes from one to another: a model of your own.
@@ -50,7 +56,7 @@ class EndStates:
     after_gain, after_loss : (n,) sequence of int, optional
         The state stays as it is if not given.
     names : (n,) sequence of str, optional
-        For reports; numbers if not given.
+        For reports, without commas and quotes; numbers if not given.
     blocked_switch_rates : (n, n) sequence of 1/time, optional
         How much larger switch_rates are while what is in its way lets no monomer come: the rate is ``switch_rates +
         blocked_switch_rates (1 - s)`` with s the share of the monomers that come, which is that of the speed at which
@@ -118,7 +124,9 @@ class EndStates:
                 raise InputError(f"{name} must have a number of a state, from 0 to {count - 1}, for each of {count}.")
             object.__setattr__(self, name, tuple(int(state) for state in after))
         names = tuple(self.names) or tuple(map(str, range(count)))
-        if len(names) != count or not all(isinstance(name, str) for name in names) or len(set(names)) < count:
+        for name in names:
+            check_state_name(name)
+        if len(names) != count or len(set(names)) < count:
             raise InputError(f"names must have a string of its own for each of {count} states.")
         object.__setattr__(self, "names", names)
 
@@ -137,14 +145,13 @@ class EndStates:
             raise InputError(f"There is no end state {name!r}: there are {', '.join(self.names)}.")
         return self.names.index(name)
 
-    def net_rate(self, concentration: float) -> float:
-        """The mean of what a free end gains, less what it loses, in 1/ps, at a concentration in 1/nm^3.
+    def shares(self, concentration: float) -> FloatArray:
+        """Which share of its time a free end is in each state in the long run, at a concentration in 1/nm^3: (n,).
 
-        The mean over the states that it has in the long run, where these do not depend on which monomer comes to light.
-        NaN if they depend on lengths.
+        Where its states do not depend on which monomer comes to light. NaN if they depend on lengths.
         """
         if any(self.switch_lengths):
-            return float("nan")
+            return np.full(len(self.names), np.nan)
         on, off = np.array(self.on_rates) * concentration, np.array(self.off_rates)
         count = len(on)
         leaving = np.array(self.switch_rates)
@@ -159,7 +166,13 @@ class EndStates:
         generator = generator[np.ix_(reached, reached)] / max(np.abs(generator).max(), 1e-300)
         conditions = np.vstack([generator.T, np.ones(len(reached))])
         shares[reached] = np.linalg.lstsq(conditions, np.eye(len(reached) + 1)[-1], rcond=None)[0]
-        return float(shares @ (on - off))
+        return shares
+
+    def net_rate(self, concentration: float) -> float:
+        """The mean of what a free end gains, less what it loses, in 1/ps, at a concentration in 1/nm^3; see
+        ``shares``."""
+        gains = np.array(self.on_rates) * concentration - np.array(self.off_rates)
+        return float(self.shares(concentration) @ gains)
 
     def _share_of_rates(self, length: float) -> FloatArray:
         # By what the rates from each state are to be multiplied, of a filament of a length.
@@ -202,7 +215,7 @@ def _reached_from_first(leaving: FloatArray) -> list[int]:
     return sorted(reached)
 
 
-GROWING, SHRINKING = "growing", "shrinking"
+GROWING, SHRINKING, CAPPED = "growing", "shrinking", "capped"
 
 ENDS = "minus", "plus"
 """Of a filament, at its first and its last node."""

@@ -20,6 +20,7 @@ from ..units.quantities import (
     VOLUME,
     as_number_density,
     non_negative,
+    one_of,
     positive,
     require_kind,
     shown,
@@ -27,7 +28,18 @@ from ..units.quantities import (
 )
 from ..units.types import FloatArray, Indices, Scalar
 from .chain_type import ChainType
-from .end_states import ENDS, GROWING, SHRINKING, DynamicInstability, EndStates, TwoUnitCap, as_on_rate, as_tuple
+from .end_states import (
+    CAPPED,
+    ENDS,
+    GROWING,
+    SHRINKING,
+    DynamicInstability,
+    EndStates,
+    TwoUnitCap,
+    as_on_rate,
+    as_tuple,
+    check_state_name,
+)
 from .filament_type import FilamentType
 from .severing import Severing
 
@@ -82,7 +94,7 @@ class MonomerState:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        require_kind(self.name, str, "name of a MonomerState")
+        check_state_name(self.name)
         for name in ("rate", "plus_off_rate", "minus_off_rate"):
             object.__setattr__(self, name, non_negative(getattr(self, name), RATE, f"{self.name}: {name}"))
         for name in ("plus_on_rate", "minus_on_rate"):
@@ -148,7 +160,11 @@ class Monomers:
             object.__setattr__(self, off, non_negative(getattr(self, off), RATE, off))
 
     def states(self, end: str) -> EndStates:
-        """Those of the "plus" or "minus" end: one, or those of the last monomer if monomers age."""
+        """Those of the "plus" or "minus" end: one, or those of the last monomer if monomers age.
+
+        InputError for another end.
+        """
+        one_of(end, ENDS, "end")
         first_on, first_off = getattr(self, f"{end}_on_rate"), getattr(self, f"{end}_off_rate")
         on_rates, off_rates = [first_on], [first_off]
         switches = np.zeros((1 + len(self.aging), 1 + len(self.aging)))
@@ -334,14 +350,23 @@ class Growth:
             raise InputError("A filament with two capped ends does not grow: leave its growth out.")
 
     def rates(self, end: str) -> tuple[float, float]:
-        """k_on in nm^3/ps and k_off in 1/ps of the "plus" or "minus" end; zero if it is capped."""
+        """k_on in nm^3/ps and k_off in 1/ps of the "plus" or "minus" end; zero if it is capped.
+
+        InputError for another one.
+        """
+        one_of(end, ENDS, "end")
         if getattr(self, f"{end}_capped"):
             return 0.0, 0.0
         return getattr(self.monomers, f"{end}_on_rate"), getattr(self.monomers, f"{end}_off_rate")
 
     def states(self, end: str) -> EndStates:
-        """What the "plus" or "minus" end does in each of its states."""
-        return self._states_of_ends[end]
+        """What the "plus" or "minus" end does in each of its states; InputError for another one."""
+        return self._states_of_ends[one_of(end, ENDS, "end")]
+
+    @property
+    def keeps_first_node(self) -> bool:
+        """Whether a filament has one first node for all time: its minus end never grows, and it does not vanish."""
+        return not (self.states("minus").grows or self.vanishes)
 
     @cached_property
     def _states_of_ends(self):
@@ -357,7 +382,9 @@ class Growth:
         if not getattr(self, f"{end}_capped"):
             return states
         none = (0.0,) * len(states.names)
-        return replace(states, on_rates=none, off_rates=none)
+        # Those of monomers that age go on.
+        names = states.names if self.monomers.aging else (CAPPED,)
+        return replace(states, on_rates=none, off_rates=none, names=names)
 
     def monomers_per_segment(self, filament_type: FilamentType) -> int:
         """The monomers of a segment; InputError if they are not a whole number from 2 on."""

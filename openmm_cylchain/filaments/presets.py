@@ -1,9 +1,10 @@
-"""Filament types of actin, DNA and microtubules, and what they grow of."""
+"""Filament types of actin, DNA and microtubules, what they grow of, and what holds their ends."""
 
 from dataclasses import replace
 
 from openmm import unit
 
+from .end_states import EndStates
 from .filament_type import FilamentType
 from .growth import Monomers, MonomerState
 
@@ -99,6 +100,22 @@ ACTIN_AGING = replace(
 New ones have the rates of ACTIN_ATP; k_off of ADP-Pi 0.2 and 0.02 per s at the plus and minus end, and of ADP 5.4 and
 0.25 per s (Fujiwara, Vavylonis and Pollard, Proc. Natl. Acad. Sci. 2007, 104, 8827). Hydrolysis at 0.3 per s (Blanchoin
 and Pollard, Biochemistry 2002, 41, 597), phosphate at 0.0026 per s (Carlier, Pantaloni, Biochemistry 1986, 25, 7789).
+"""
+
+_GATING_OF_MDIA1 = 0.9
+
+MDIA1_ENDS = EndStates(
+    names=("free", "with formin"),
+    on_rates=(ACTIN_ATP.plus_on_rate, _GATING_OF_MDIA1 * ACTIN_ATP.plus_on_rate),
+    off_rates=(ACTIN_ATP.plus_off_rate, _GATING_OF_MDIA1 * ACTIN_ATP.plus_off_rate),
+    switch_rates=((0.0, 0.0), (0.0, 0.0)),
+)
+"""Plus ends of ATP-actin, free and with the formin mDia1, without profilin: for a ``HandAtEnd`` that changes them.
+
+Free ones are those of ACTIN_ATP. With mDia1 (its domains FH1 and FH2) they grow 0.9 times as fast, its gating factor
+(Kovar, Harris, Mahaffy, Higgs, Pollard, Cell 2006, 124, 423). That k_off has the same factor is no measurement: a
+formin that stays at the end while monomers come and go leaves the concentration as it is at which the end stands still.
+Other formins slow ends down more; profilin speeds them up.
 """
 
 TUBULIN = Monomers(

@@ -152,26 +152,21 @@ def _add_hand(force, hand, filaments, name):
     if hand.severing_rate > 0.0 and not any(filaments[i].growth is not None for i in chains):
         raise InputError(f"Linkers {name!r}: a hand cuts filaments, but binds to none that grow: give them a growth.")
     if hand.filament_end is not None:
-        _set_hand_at_end(force, number, hand.filament_end, {i: filaments[i] for i in chains}, name)
+        _set_hand_at_end(force, number, hand, {i: filaments[i].growth for i in chains}, name)
     return number
 
 
-def _set_hand_at_end(force, number, own, filaments, name):
-    growths = {i: one.growth for i, one in filaments.items() if one.growth is not None}
-    if not growths:
-        raise InputError(f"Linkers {name!r}: a hand has to do with ends, but binds to no filaments that grow.")
-    states, changed = {(-1, -1)}, []
+def _set_hand_at_end(force, number, hand, growths, name):
+    own = hand.filament_end
+    # Many filaments share a growth.
+    different = {id(growth): growth for growth in growths.values() if growth is not None}
+    try:
+        free, held = own.find_changes(different.values())
+    except InputError as error:
+        raise InputError(f"Linkers {name!r}: {error}") from None
+    changed = []
     if own.changes is not None:
-        names = {i: growth.states(own.end).names for i, growth in growths.items()}
-        changed = [i for i, known in names.items() if set(own.changes) <= set(known)]
-        states = {tuple(map(names[i].index, own.changes)) for i in changed}
-        if len(states) != 1:
-            known = " or ".join(dict.fromkeys(", ".join(one) for one in names.values()))
-            raise InputError(
-                f"Linkers {name!r}: a hand changes {own.end} ends from {own.changes[0]!r} to {own.changes[1]!r}, which "
-                f"{'no filament has' if not states else 'have different numbers'} among their states {known}."
-            )
-    ((free, held),) = states
+        changed = [i for i, growth in growths.items() if growth is not None and own.may_change(growth)]
     force.setHandAtEnd(number, int(own.end == "plus"), own.range, own.binds_there, own.tracks, free, held, changed)
 
 

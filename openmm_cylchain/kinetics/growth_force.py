@@ -16,7 +16,7 @@ from ..filaments.filament_type import FilamentType
 from ..filaments.grown import count_nodes_of_monomers, rest_lengths
 from ..filaments.growth import joints_by_monomers, segments_by_monomers
 from ..units.quantities import AVOGADRO, LENGTH, NUMBER_DENSITY, shown
-from ..units.types import BoolArray, FloatArray, IntArray
+from ..units.types import BoolArray, FloatArray, IntArray, StringArray
 from .branching import Branching
 from .first_places import contour_of
 from .nucleation import nucleations_of
@@ -149,6 +149,8 @@ class FilamentGrowth:
         gained one, but had no spare node.
     end_states : (n, 2) int array
         The number of the state of each end among ``EndStates.names``.
+    state_names : (n, 2) str array
+        Its name; empty where there is no filament.
     shrinking : (n, 2) bool array
         Whether each end shrinks now, of those with dynamic instability.
     catastrophes, rescues : (n, 2) int arrays
@@ -171,6 +173,7 @@ class FilamentGrowth:
     lost: IntArray
     waited: IntArray
     end_states: IntArray
+    state_names: StringArray
     shrinking: BoolArray
     catastrophes: IntArray
     rescues: IntArray
@@ -196,15 +199,17 @@ def growth_of(context: openmm.Context, filaments: Sequence[Filament]) -> Filamen
     per_segment = np.array([filament.growth.monomers_per_segment(filament.type) for filament in own])
     molar = np.array(densities)[[pool for _, _, pool, *_ in chains]] / AVOGADRO
     identities, parents = np.array(lineages, dtype=int).reshape(-1, 2).T
+    nodes = count_nodes_of_monomers(monomers, per_segment)
     return FilamentGrowth(
         np.array([number for number, *_ in chains]),
         monomers,
         (monomers[:, 1] - monomers[:, 0]) * per_monomer * LENGTH,
-        count_nodes_of_monomers(monomers, per_segment),
+        nodes,
         counts[:, :, 0],
         counts[:, :, 1],
         counts[:, :, 2],
         end_states,
+        _names_of_states([filament.growth for filament in own], end_states, nodes > 0),
         counts[:, :, 3].astype(bool),
         counts[:, :, 4],
         counts[:, :, 5],
@@ -213,6 +218,14 @@ def growth_of(context: openmm.Context, filaments: Sequence[Filament]) -> Filamen
         parents,
         *map(int, population),
     )
+
+
+def _names_of_states(growths, end_states, there):
+    names = [
+        [growth.states(end).names[number] if present else "" for end, number in zip(ENDS, numbers)]
+        for growth, numbers, present in zip(growths, end_states, there)
+    ]
+    return np.array(names, dtype=str).reshape(-1, 2)
 
 
 def _counts_of_ends(growths, end_states, events):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from ..filaments.end_states import ENDS
+from ..filaments.growth import Growth
 from ..units.quantities import LENGTH, one_of, positive, shown, true_or_false
 from ..units.types import Scalar
 
@@ -72,3 +73,31 @@ class HandAtEnd:
                     f"HandAtEnd: changes must be the names of two different states, but is {shown(self.changes)}."
                 )
             object.__setattr__(self, "changes", names)
+
+    def may_change(self, growth: Growth) -> bool:
+        """Whether ends of a growth have both states of ``changes``."""
+        return self.changes is not None and set(self.changes) <= set(growth.states(self.end).names)
+
+    def find_changes(self, bound: Iterable[Growth]) -> tuple[int, int]:
+        """The numbers of both states of ``changes`` among those of the ends to which it binds; -1 without changes.
+
+        InputError if none of these has such states, or if they have different numbers.
+        """
+        growths = list(bound)
+        if not growths:
+            raise InputError("a hand has to do with ends, but binds to no filaments that grow.")
+        if self.changes is None:
+            return -1, -1
+        what = f"a hand changes {self.end} ends from {self.changes[0]!r} to {self.changes[1]!r}"
+        states = [growth.states(self.end).names for growth in growths]
+        found = {
+            (names.index(self.changes[0]), names.index(self.changes[1]))
+            for names in states
+            if set(self.changes) <= set(names)
+        }
+        known = " or ".join(dict.fromkeys(", ".join(names) for names in states))
+        if not found:
+            raise InputError(f"{what}, but the states are {known}.")
+        if len(found) > 1:
+            raise InputError(f"{what}, which have different numbers among their states {known}.")
+        return found.pop()

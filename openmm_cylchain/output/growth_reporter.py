@@ -12,11 +12,11 @@ from .files import TextFile
 from .reporters import FilamentsReporter
 from .run_tables import GROWTH_TABLE_COLUMNS, MILLISECOND, in_units_of_columns, line_of_table
 
-_OF_END = ("gained", "lost", "waited", "shrinking", "catastrophes", "rescues")
+_OF_END = ("gained", "lost", "waited", "state_names", "shrinking", "catastrophes", "rescues")
 """What each end has, as FilamentGrowth says."""
 
 
-def rows_of_growth(growth: Any) -> Iterator[tuple[float, ...]]:
+def rows_of_growth(growth: Any) -> Iterator[tuple[float | str, ...]]:
     """What lines of GROWTH_TABLE_COLUMNS say behind step and time, for a FilamentGrowth; none for None."""
     if growth is None:
         return
@@ -30,7 +30,7 @@ def rows_of_growth(growth: Any) -> Iterator[tuple[float, ...]]:
             float(lengths[index]),
             int(growth.nodes[index]),
             *map(int, growth.monomers[index]),
-            *(int(count) for counts in ends for count in counts),
+            *(str(own) if isinstance(own, str) else int(own) for values in ends for own in values),
             float(concentrations[index]),
             int(growth.identities[index]),
             int(growth.parents[index]),
@@ -44,9 +44,10 @@ class GrowthReporter(FilamentsReporter):
     Columns: ``length (nm)`` at rest and ``nodes``; ``minus end (monomers)`` and ``plus end (monomers)``, the number of
     the first monomer and that behind the last one, from 0 on and as they are at the start: a treadmilling filament goes
     where these go; ``minus end gained (monomers)``, ``minus end lost (monomers)``, ``minus end waited``,
-    ``minus end shrinking``, ``minus end catastrophes``, ``minus end rescues``, and the same of ``plus end``: how many
-    monomers each end has gained and lost since the start, how often it would have gained one, but had no spare node,
-    whether it shrinks, 0 or 1, and how often it has turned; and ``free monomers (uM)``, the concentration in its pool.
+    ``minus end state``, ``minus end shrinking``, ``minus end catastrophes``, ``minus end rescues``, and the same of
+    ``plus end``: how many monomers each end has gained and lost since the start, how often it would have gained one,
+    but had no spare node, the name of its state (``EndStates.names``; empty without a filament), whether it shrinks, 0
+    or 1, and how often it has turned; and ``free monomers (uM)``, the concentration in its pool.
     A place without a filament has no nodes, and the length zero. ``identity`` says which of all filaments that have
     ever been there is in it, and ``parent`` of which it was a part, -1 for none; ``filaments nucleated``,
     ``filaments vanished``, ``filaments severed`` and ``without place`` are counts of all that grow, the same in each

@@ -28,6 +28,7 @@ from ..units.quantities import LARGEST_INT, shown, true_or_false, whole_number
 from ..units.types import FloatArray, IntArray
 from .files import TextFile, check_output_path
 from .linker_records import LINKER_COLUMNS, LinkerFile, measure_linkers
+from .run_tables import TEXT_COLUMNS
 
 if TYPE_CHECKING:
     from openmm import app
@@ -104,12 +105,12 @@ class TableReporter(ABC):
         """The times of all reports so far, in ps."""
         return np.array([time for _, time in self._reports], dtype=float)
 
-    def __getitem__(self, column: str) -> FloatArray:
+    def __getitem__(self, column: str) -> npt.NDArray[Any]:
         """An array (reports, things) of a column."""
         if not isinstance(column, str) or column not in self._columns:
             raise InputError(f"There is no column {shown(column)}: known are {', '.join(self._columns)}.")
-        table = np.array(self._rows, dtype=float).reshape(len(self._rows), -1, len(self._columns))
-        return table[:, :, self._columns.index(column)]
+        index, kind = self._columns.index(column), str if column in TEXT_COLUMNS else float
+        return np.array([[row[index] for row in rows] for rows in self._rows], dtype=kind)
 
     def close(self) -> None:
         """Close the file, if the reporter has opened it."""

@@ -145,7 +145,7 @@ PULLING_TABLE_COLUMNS = (
 """A line per report and moving tether; the extension is that of the end-to-end vector that points to the tether."""
 
 
-_EVENTS_OF_END = ("gained (monomers)", "lost (monomers)", "waited", "shrinking", "catastrophes", "rescues")
+_OF_END = ("gained (monomers)", "lost (monomers)", "waited", "state", "shrinking", "catastrophes", "rescues")
 
 POPULATION_COLUMNS = ("filaments nucleated", "filaments vanished", "filaments severed", "without place")
 """How many have, of all that grow, since the start."""
@@ -158,7 +158,7 @@ GROWTH_TABLE_COLUMNS = (
     "nodes",
     "minus end (monomers)",
     "plus end (monomers)",
-    *(f"{end} end {event}" for end in ("minus", "plus") for event in _EVENTS_OF_END),
+    *(f"{end} end {event}" for end in ("minus", "plus") for event in _OF_END),
     "free monomers (uM)",
     "identity",
     "parent",
@@ -166,6 +166,9 @@ GROWTH_TABLE_COLUMNS = (
 )
 """A line per report and place of a filament that grows, without nodes while there is none; ends are where they are
 since it began, in monomers along the filament, and have waited so often because there was no spare node."""
+
+TEXT_COLUMNS = "minus end state", "plus end state"
+"""Columns of names; others are of numbers."""
 
 
 _MEAN_FORCE_COLUMNS = (
@@ -210,19 +213,21 @@ def check_columns(path: Path, header: str, columns: Sequence[str] | None = None)
         )
 
 
-def in_units_of_columns(columns: Sequence[str], values: Sequence[float]) -> tuple[float, ...]:
+def in_units_of_columns(columns: Sequence[str], values: Sequence[float | str]) -> tuple[float | str, ...]:
     """Numbers in OpenMM's units (NaN where one has no meaning) in the units that the names of their columns say.
 
-    Energies in kT and concentrations in mol/l come as such.
+    Energies in kT, concentrations in mol/l and texts come as such.
     """
     units = (name.partition("(")[2].rstrip(")") for name in columns)
     pairs = zip(values, units, strict=True)
-    return tuple(value if isinstance(value, int) else float(value) / _SIZES.get(unit, 1.0) for value, unit in pairs)
+    return tuple(
+        value if isinstance(value, (int, str)) else float(value) / _SIZES.get(unit, 1.0) for value, unit in pairs
+    )
 
 
-def line_of_table(step: int, cells: Sequence[float]) -> str:
-    """A line of a table: a step, and numbers to the last digit."""
-    return ",".join(map(repr, (step, *cells)))
+def line_of_table(step: int, cells: Sequence[float | str]) -> str:
+    """A line of a table: a step, numbers to the last digit, and texts without commas."""
+    return ",".join(cell if isinstance(cell, str) else repr(cell) for cell in (step, *cells))
 
 
 class ReportTable:
@@ -242,8 +247,8 @@ class ReportTable:
             check_columns(path, self._file.readline().decode(errors="replace").rstrip("\r\n"))
             self._file.seek(0, os.SEEK_END)
 
-    def write(self, step: int, values: Sequence[float]) -> None:
-        """Append a line: the step and a number for each further column, as ``in_units_of_columns`` takes them."""
+    def write(self, step: int, values: Sequence[float | str]) -> None:
+        """Append a line: the step and a value for each further column, as ``in_units_of_columns`` takes them."""
         cells = in_units_of_columns(self._columns[1:], values)
         self._file.write(line_of_table(step, cells).encode() + b"\n")
         self._file.flush()

@@ -33,9 +33,10 @@ from .tables.couplings import (
 )
 from .tables.filament import FILAMENT, MOST_NODES, read_filaments, read_reserve
 from .tables.filament_types import PRESETS as PRESETS
+from .tables.growth import GROWTH, check_with_others
 from .tables.joints import JOINT, read_joint
 from .tables.linkers import HAND, LINKERS, binds_to, read_linkers
-from .tables.monomers import GROWTH, MONOMERS, check_names, check_with_others, read_monomers
+from .tables.monomers import MONOMERS, check_names, read_monomers
 from .tables.nucleation import BRANCHING, NUCLEATION, check_places, read_branching, read_nucleation
 from .tables.particles import PARTICLES, read_particles
 from .tables.simulation import SIMULATION, SimulationSettings, read_seed, read_simulation

@@ -58,8 +58,8 @@ class Conformations:
         # Of each group and load: the curves of its filaments.
         for group, load, members in self._groups:
             curves = [own[0] for own in filament_curves(self._trajectory[frame], members)]
-            # Filaments that are not there have all of their particles in one place.
-            yield group, load, [unrolled(own) if group.closed else own for own in curves if np.ptp(own, axis=0).any()]
+            # Filaments that are not there have NaN.
+            yield group, load, [unrolled(own) if group.closed else own for own in curves if np.isfinite(own).all()]
 
     def draw(self, axis, frame):
         """Draw a frame, with a legend and a scale bar below."""

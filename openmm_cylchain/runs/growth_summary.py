@@ -34,6 +34,8 @@ class EndSummary:
         Monomers that an end gained in a second, less those that it lost, on average; None if there was none.
     rate_of_free_ends : float or None
         See ``free_rate``, at the mean concentration; of filaments that vanish, only of ends with a single state.
+    states : tuple of StateShare
+        Of an end with several states.
     """
 
     name: str
@@ -44,6 +46,21 @@ class EndSummary:
     rate: float | None
     rate_error: float | None
     rate_of_free_ends: float | None
+    states: tuple
+
+
+@dataclass(frozen=True)
+class StateShare:
+    """The share of their time for which ends are in a state, at the reports of the last half of a run.
+
+    ``share`` and its error are None if there were no filaments; ``share_of_free_ends`` is that in the long run at the
+    mean concentration (``EndStates.shares``), None where monomers age or filaments vanish, whose states depend on more.
+    """
+
+    name: str
+    share: float | None
+    share_error: float | None
+    share_of_free_ends: float | None
 
 
 @dataclass(frozen=True)
@@ -140,8 +157,21 @@ def _summarise(table, growth, numbers, label, end):
     concentration = float(table.column("free monomers (uM)", numbers).mean())
     # Those that shrink vanish, and are no more to be counted.
     known = not growth.vanishes or len(growth.states(end).names) == 1
-    of_free_one = _finite(free_rate(growth, end, concentration)) if known else None
-    return EndSummary(label, end, *counts, *rate, of_free_one)
+    free = _finite(free_rate(growth, end, concentration)) if known else None
+    return EndSummary(label, end, *counts, *rate, free, tuple(_shares_of_states(table, growth, numbers, end)))
+
+
+def _shares_of_states(table, growth, numbers, end):
+    states, late = growth.states(end), _late(table)
+    if len(states.names) == 1:
+        return
+    names, there = table.column(f"{end} end state", numbers)[late], table.there(numbers)[late]
+    concentration = float(table.column("free monomers (uM)", numbers)[late].mean()) * MICROMOLAR
+    known = not (growth.monomers.aging or growth.vanishes or any(states.switch_lengths))
+    free = states.shares(concentration).tolist() if known else [None] * len(states.names)
+    for name, of_free_ends in zip(states.names, free):
+        share = _ratio(np.sum((names == name) & there, axis=1, dtype=float), there.sum(axis=1, dtype=float))
+        yield StateShare(name, *map(_finite, share), of_free_ends)
 
 
 def rate_of_gains(table, end, numbers=None, late=slice(None), sizes=1.0):

@@ -360,6 +360,30 @@ class Listing:
 
 
 @dataclass(frozen=True)
+class Named:
+    """Values of one kind by names of your own, in a table within another one."""
+
+    kind: object
+    what: str
+    example: str
+
+    @property
+    def text(self):
+        return f"a table of {self.what}"
+
+    def read(self, value, place):
+        if not isinstance(value, dict):
+            raise place.error(f"must be a table of {self.what}, as in {self.example}, but is {as_written(value)}.")
+        return {
+            name: self.kind.read(own, Place(f"{place.name} {name!r}", (*place.path, name)))
+            for name, own in value.items()
+        }
+
+    def schema(self):
+        return {"type": "object", "additionalProperties": self.kind.schema()}
+
+
+@dataclass(frozen=True)
 class Either:
     """A value of the first kind that takes it: ``(type, kind)`` in turn, the last one if none does."""
 

@@ -4,7 +4,7 @@ python -m openmm_cylchain.runs.reference > docs/configuration.md
 """
 
 from .configuration import TABLES
-from .keys import REQUIRED, Choice, Listing
+from .keys import REQUIRED, Choice, Either, Listing
 from .table import TableKind
 
 _INTRODUCTION = """# The file of a run
@@ -14,7 +14,7 @@ This page is made from the list of keys that reads the file, and so is the schem
 
 Quantities are texts with a number and a unit: `"360 nm"`, `"0.1 pN/nm"`, `"1.71 mPa*s"`. Points are lists of three
 lengths, directions lists of three numbers. `[table]` is written once, `[[table]]` any number of times. At the top,
-before all tables, there may be a `title`.
+before all tables, there may be a `title`. A table within another one is described where it comes first.
 """
 
 _FILES = """
@@ -26,25 +26,32 @@ and a `frame`. It is looked for beside the configuration; a run keeps a copy in 
 
 def reference_page():
     """The page as Markdown."""
-    parts = [_INTRODUCTION]
+    parts, known = [_INTRODUCTION], []
     for kind in TABLES:
-        parts += section(kind, "##", kind.header)
+        parts += section(kind, "##", kind.header, known)
         if kind.name == "filament":
             parts.append(_FILES)
     return "\n".join(parts)
 
 
-def section(kind, level, title):
-    """Lines of a table of keys below a heading."""
+def section(kind, level, title, known=None):
+    """Lines of a table of keys below a heading, and of those within it; but for a list of known ones, which grows."""
+    known = [] if known is None else known
     needed = " (required)" if kind.required else ""
     yield f"{level} `{title}`{needed}\n\n{kind.text}\n\n| key | value | meaning |\n|---|---|---|"
     inner = []
     for key in kind.keys:
-        yield f"| `{key.name}` | {_value(key)} | {_meaning(key)} |"
+        if key.name not in kind.borrowed:
+            yield f"| `{key.name}` | {_value(key)} | {_meaning(key)} |"
         inner += _tables_in(key)
+    if kind.borrowed:
+        names = ", ".join(f"`{name}`" for name in kind.borrowed)
+        yield f"\nWithout a `table`, also keys of a `[[filament]]`: {names}."
     yield ""
     for name, table in inner:
-        yield from section(table, "###", f"{name} of {title}")
+        if table not in known:
+            known.append(table)
+            yield from section(table, "###", f"{name} of {title}", known)
 
 
 def _value(key):
@@ -72,7 +79,8 @@ def _written(value):
 
 def _tables_in(key):
     # Of a list, the table that its items are.
-    kind = key.kind.kind if isinstance(key.kind, Listing) else key.kind
+    kind = key.kind.kinds[0][1] if isinstance(key.kind, Either) else key.kind
+    kind = kind.kind if isinstance(kind, Listing) else kind
     table = getattr(kind, "table", None)
     if isinstance(table, TableKind):
         yield key.name, table

@@ -66,7 +66,7 @@ def format_summary(configuration, groups, linkers=(), measures=(), growth=(), po
             "  Means over the last half of the run; the largest tension of all of it.",
         ]
     if growth:
-        lines += ["", *_growth_table(growth), *_waits(growth)]
+        lines += ["", *_growth_table(growth), *_waits(growth), *_states_of_ends(growth)]
     if population:
         lines += ["", *_population(population)]
     compared = [[own for own in group.observables if own.verdict != NOT_COMPARABLE] for group in groups]
@@ -141,10 +141,27 @@ def _growth_table(growth):
     rows = [("ends of filaments that grow", "monomers gained", "lost", "gained per second and end", "of free ends")]
     for own in growth:
         rate = _with_error(own.rate, own.rate_error)
-        name = f"{own.name}, {own.end} end{'s' * (not own.name.startswith('1 '))}"
+        name = _name_of_ends(own)
         free = "-" if own.rate_of_free_ends is None else _rounded(own.rate_of_free_ends, 3)
         rows.append((name, str(own.gained), str(own.lost), rate, free))
     return _aligned(rows, (0,))
+
+
+def _name_of_ends(own):
+    return f"{own.name}, {own.end} end{'s' * (not own.name.startswith('1 '))}"
+
+
+def _states_of_ends(growth):
+    if not any(own.states for own in growth):
+        return
+    rows = [("states of ends", "share of the time (%)", "of free ends")]
+    for own in growth:
+        for state in own.states:
+            share, error = (None if one is None else 100.0 * one for one in (state.share, state.share_error))
+            free = "-" if state.share_of_free_ends is None else _rounded(100.0 * state.share_of_free_ends, 3)
+            rows.append((f"{_name_of_ends(own)}: {state.name}", _with_error(share, error), free))
+    yield from ("", *_aligned(rows, (0,)))
+    yield "  At the reports of the last half of the run."
 
 
 def _with_error(value, error):

@@ -114,7 +114,8 @@ class Entries:
 class TableKind:
     """A kind of table: ``[name]``, ``[[name]]`` if it is repeated, or one within another table.
 
-    ``text`` is what the reference says of it; ``owner`` what messages call it where a key belongs to it.
+    ``text`` is what the reference says of it; ``owner`` what messages call it where a key belongs to it. ``borrowed``
+    are keys of another table, of which the reference only says their names.
     """
 
     name: str
@@ -123,6 +124,7 @@ class TableKind:
     repeated: bool = False
     owner: str = ""
     required: bool = False
+    borrowed: tuple[str, ...] = ()
 
     @property
     def header(self):

@@ -238,8 +238,8 @@ class RunReporter:
             for number, row in enumerate(rows):
                 self._linkers.write(step, (time, number, *row))
             self._places.write(records)
-        for row in rows_of_growth(growth):
-            self._growth.write(step, (time, *row))
+        for line in rows_of_growth(growth):
+            self._growth.write(step, (time, *line))
         walls, contacts = self._readers.wall_forces(), self._readers.contact_forces()
         self._forces.write(step, time, walls, contacts, self._filaments)
         self._energies.write(step, (time, *cells))

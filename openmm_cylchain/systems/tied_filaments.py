@@ -29,6 +29,8 @@ class TiedFilaments(AddedFilaments):
         self._tethers: list[Tether] = []
         self._tethered_nodes: set[tuple[int, int]] = set()
         self._linkers: list[Linkers] = []
+        # For so many filaments: the linkers of the joints of their branches.
+        self._joints: tuple[int, list[Linkers]] = (0, [])
         # By Context: what has moved there, by number.
         self._moved_tethers: WeakKeyDictionary[Any, dict[int, Tether]] = WeakKeyDictionary()
         self._attachments: list[Attachment] = []
@@ -90,9 +92,10 @@ class TiedFilaments(AddedFilaments):
         self._refuse_if_built(label)
         filament = self._filament_number(filament, label)
         (node,) = named_nodes([node], len(self[filament].positions), f"{label}:")
-        growth = self[filament].growth
-        if growth is not None and not (node == 0 and not growth.states("minus").grows):
-            self._lasting_filament(filament, label, "a tether", "Its first node can, with minus_capped=True.")
+        own = self[filament]
+        if own.is_reserve or (own.growth is not None and not (node == 0 and own.growth.keeps_first_node)):
+            advice = "Its first node can, with minus_capped=True, if it does not vanish."
+            self._lasting_filament(filament, label, "a tether", "" if own.is_reserve else advice)
         if (filament, node) in self._tethered_nodes:
             raise InputError(f"{label}: node {node} of filament {filament} has a tether already.")
         x, y, z = (float(x) for x in vector(point, LENGTH, f"{label}: point"))
@@ -270,8 +273,12 @@ class TiedFilaments(AddedFilaments):
     def linkers(self) -> tuple[Linkers, ...]:
         """Tuple of the types of linkers, in the order of their numbers, as they were added, and behind them those of
         the joints of branches."""
-        joints = [own.linkers(f"branch_{number}", self.temperature) for number, own in branchings_of(self._filaments)]
-        return (*self._linkers, *(linkers for joint in joints for linkers in joint))
+        if self._joints[0] != len(self):
+            joints = [
+                own.linkers(f"branch_{number}", self.temperature) for number, own in branchings_of(self._filaments)
+            ]
+            self._joints = len(self), [linkers for joint in joints for linkers in joint]
+        return (*self._linkers, *self._joints[1])
 
     def _attach(self, attachment):
         self._attachments.append(attachment)

@@ -31,6 +31,9 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.integer]
 """An array of whole numbers."""
 
+StringArray: TypeAlias = npt.NDArray[np.str_]
+"""An array of texts."""
+
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 """An array of truth values."""
 

@@ -210,12 +210,41 @@ def test_a_system_keeps_what_hands_do_at_ends():
         (lambda: HandAtEnd(end="plus", range=1.0, changes=("free",)), "two different states"),
         (lambda: HandAtEnd(end="plus", range=1.0, tracks=1.0), "tracks"),
         (lambda: Hand(binding_rate=1.0, reach=1.0, unbinding_rate=1.0, filament_end="plus"), "filament_end"),
-        (lambda: system_with(formin(changes=("free", "slow")), states(20.0, 4.0)), "no filament has"),
+        (lambda: system_with(formin(changes=("free", "slow")), states(20.0, 4.0)), "but the states are free, held"),
     ],
 )
 def test_wrong_ends_are_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_states_that_a_hand_changes_have_the_same_numbers():
+    three = EndStates(
+        on_rates=[1, 1, 1], off_rates=[0, 0, 0], switch_rates=np.zeros((3, 3)), names=["free", "odd", "held"]
+    )
+    own, other = (
+        Growth(monomers=Monomers(length=2.7), pool=1e-4, longest=1200.0, plus_instability=plus)
+        for plus in (states(20.0, 4.0), three)
+    )
+    hand = formin().filament_end
+    assert hand.find_changes([own]) == (0, 1) and hand.find_changes([other]) == (0, 2)
+    with pytest.raises(InputError, match="different numbers"):
+        hand.find_changes([own, other])
+
+
+def test_reserves_have_no_tethers():
+    filaments = Filaments(viscosity=1e-3 * unit.pascal * unit.second, temperature=298.0)
+    monomers = Monomers(length=2.7, plus_on_rate=PER_CONCENTRATION)
+    growth, vanishing = (
+        Growth(monomers=monomers, pool=1e-4, longest=1200.0, minus_capped=True, vanishes=vanishes)
+        for vanishes in (False, True)
+    )
+    filaments.add_straight(ACTIN, 4, [0, 0, 0], [1, 0, 0], growth=vanishing)
+    filaments.add_reserve(ACTIN, 1, growth=growth)
+    with pytest.raises(InputError, match="if it does not vanish"):
+        filaments.add_tether(0, 0, [0, 0, 0], 0.5)
+    with pytest.raises(InputError, match="its nodes come and go"):
+        filaments.add_tether(1, 0, [0, 0, 0], 0.5)
 
 
 def test_the_first_node_of_a_capped_end_has_a_tether():

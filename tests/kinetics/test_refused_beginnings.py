@@ -122,6 +122,12 @@ def test_severing(changes, message):
         growth(severing=Severing(**{"rate": PER_LENGTH, **changes}))
 
 
+@pytest.mark.parametrize("read", [growth().states, growth().rates, ACTIN_ATP.states])
+def test_other_ends(read):
+    with pytest.raises(InputError, match="end must be one of minus, plus, but is 'side'"):
+        read("side")
+
+
 STATES = {"on_rates": [0.0, 0.0], "off_rates": [0.0, 0.0], "switch_rates": [[0.0, 1.0], [1.0, 0.0]]}
 
 
@@ -179,7 +185,7 @@ def test_aging(aging, message):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"name": 3}, "name of a MonomerState"),
+        ({"name": 3}, "The name of a state"),
         ({"rate": NAN}, "old: rate must be finite"),
         ({"plus_off_rate": -1.0}, "old: plus_off_rate cannot be negative"),
         ({"plus_on_rate": 1 * SECOND}, "old: plus_on_rate has the unit second"),

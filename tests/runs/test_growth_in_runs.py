@@ -137,7 +137,7 @@ NAMED = MONOMERS + 'name = "other"\n'
             + ('hand = { binds_to = "MICROTUBULE" }\n',),
             {},
         ),
-        ("tethers do not hold filaments that grow yet", (NODE,), {}),
+        ("tethers hold the first node alone", (NODE,), {}),
         ("constant forces do not pull at", ('[[pull]]\ntable = 1\ntension = "1 pN"\n',), {}),
         ("may join filaments that grow", (LINK, 'within = "1 um"\n'), {}),
         (

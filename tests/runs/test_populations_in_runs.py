@@ -182,7 +182,7 @@ def test_they_begin_anywhere_in_a_periodic_box(tmp_path):
             {"filament": FILAMENT + GROWTH.replace("= true", "= true, minus_capped = true") + "clamped = [0]\n"},
         ),
         (
-            "tethers do not hold filaments that grow yet",
+            "which is not there at times",
             (NUCLEATION, INSIDE, '[[tether]]\nfilament = 4\nnode = 0\nstiffness = "1 pN/nm"\n'),
             {},
         ),
@@ -285,6 +285,13 @@ def test_tables_say_what_comes_and_goes(directory):
     np.testing.assert_array_equal(there.sum(axis=1), begun[:, 0])
     assert growth.nucleated > 5 and growth.severed >= 3 and growth.vanished > 0
     assert np.all(table["length (nm)"][~there] == 0.0) and not there[0, 8:].any()
+    for end in ("minus", "plus"):
+        assert np.all((table[f"{end} end state"] == "") == ~there)
+    assert {"new", "ADP"} <= set(table["plus end state"][:, :6][there[:, :6]]) <= {"new", "ADP-Pi", "ADP"}
+    # Curves of those that are not there have no points.
+    run = analysis.load(directory)
+    curves = analysis.filament_curves(run.mdtraj())
+    assert np.array_equal(np.array([np.isfinite(own).all(axis=(1, 2)) for own in curves]).T, there)
     energies = np.loadtxt(directory / "energies.csv", delimiter=",", skiprows=1)
     assert np.all(np.isfinite(energies))
 

@@ -304,6 +304,94 @@ checks = false
 """Filaments that begin, vanish, are cut and branch, of monomers that age and with caps; it takes two seconds."""
 
 
+ENDS = """
+title = "ends"
+[solvent]
+temperature = "298 K"
+viscosity = "10 mPa*s"
+[[monomers]]
+type = "ACTIN_ATP"
+concentration = "50 uM"
+[[monomers]]
+name = "rings"
+length = "8 nm"
+plus_on_rate = "5 1/(uM*s)"
+minus_on_rate = "2 1/(uM*s)"
+concentration = "20 uM"
+[[filament]]
+type = "F_ACTIN"
+segment_length = "108 nm"
+segments = 4
+count = 6
+inside = { shape = "sphere", radius = "0.4 um" }
+[filament.growth]
+monomers = "ACTIN_ATP"
+longest = "1 um"
+minus_capped = true
+plus_states = [
+    { name = "free", switch_rates = { "in pause" = "60 1/s" } },
+    { name = "with formin", on_rate = "3 1/(uM*s)", off_rate = "0.4 1/s" },
+    { name = "in pause", on_rate = "0 1/(uM*s)", off_rate = "0 1/s", switch_rates = { free = "30 1/s" } },
+]
+[[filament]]
+type = "MICROTUBULE"
+segment_length = "160 nm"
+segments = 3
+count = 4
+inside = { shape = "sphere", radius = "0.4 um" }
+[filament.growth]
+monomers = "rings"
+longest = "1.2 um"
+shortest = "100 nm"
+minus_catastrophe_rate = "10 1/s"
+minus_rescue_rate = "20 1/s"
+minus_shrinking_off_rate = "50 1/s"
+minus_shrinking_on_rate = "0.1 1/(uM*s)"
+[[filament]]
+type = "MICROTUBULE"
+segment_length = "160 nm"
+segments = 3
+position = ["0 nm", "0 nm", "300 nm"]
+[filament.growth]
+monomers = "rings"
+longest = "1.2 um"
+plus_capped = true
+minus_states = [
+    { name = "odd", after_gain = "even", after_loss = "even", off_rate = "10 1/s" },
+    { name = "even", after_gain = "odd", after_loss = "odd", off_rate = "10 1/s" },
+]
+[[linkers]]
+name = "formin"
+stiffness = "0.1 pN/nm"
+rest_length = "40 nm"
+concentration = "10 uM"
+[[linkers.hands]]
+binding_rate = "100 1/s"
+reach = "50 nm"
+unbinding_rate = "5 1/s"
+binds_to = "F_ACTIN"
+filament_end = { end = "plus", range = "20 nm", binds_there = true, tracks = true, changes = ["free", "with formin"] }
+[[linkers.hands]]
+binding_rate = "0 1/s"
+reach = "50 nm"
+unbinding_rate = "0 1/s"
+[[tether]]
+table = 1
+node = 0
+stiffness = "0.5 pN/nm"
+[simulation]
+time_step = "0.1 ms"
+duration = "100 ms"
+report_interval = "5 ms"
+checkpoint_interval = "15 ms"
+seed = 2
+platform = "CPU"
+threads = 1
+checks = false
+"""
+"""Ends with states of one's own, minus ends that turn, formins at ends, and tethers of capped ends."""
+
+
 def placed_filaments(configuration):
     """Filaments with their initial positions, and linkers, that a run of a configuration has."""
     settings = configuration.simulation

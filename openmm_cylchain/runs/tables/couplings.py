@@ -284,7 +284,8 @@ def _filaments(entries, groups):
     if "table" in entries:
         numbers, first = [], 0
         for group in groups:
-            numbers += range(first, first + group.count) if group.table == entries["table"] else ()
+            there = group.table == entries["table"] and not group.is_reserve
+            numbers += range(first, first + group.count) if there else ()
             first += group.count
         if not numbers:
             raise entries.at("table").error(f"is {entries['table']}, but there is no such [[filament]] table.")

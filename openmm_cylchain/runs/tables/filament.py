@@ -15,7 +15,7 @@ from ..keys import Choice, Either, Flag, Inline, Key, Listing, Quantity, Text, W
 from ..start_files import read_start
 from ..table import TableKind
 from .filament_types import MONOMER_LENGTHS, TYPE_KEYS, read_filament_type
-from .monomers import GROWTH, GROWTH_EXAMPLE, SEVERING_EXAMPLE, read_growth
+from .growth import GROWTH, GROWTH_EXAMPLE, SEVERING_EXAMPLE, read_growth
 from .shapes import REGION, REGION_EXAMPLE, Region
 
 STARTS = ("equilibrium", "straight")

@@ -7,12 +7,14 @@ import numpy as np
 
 from ...couplings.wall_points import random_points_on
 from ...errors import InputError
+from ...filaments.end_states import ENDS
 from ...kinetics.crosslinker import Crosslinker
 from ...kinetics.hand import AT_ENDS, Hand
+from ...kinetics.hand_at_end import HandAtEnd
 from ...kinetics.linkers import as_linkers
 from ...kinetics.presets import PRESETS
 from ...units import quantities as units
-from ..keys import REQUIRED, Choice, Flag, Inline, Key, Number, Pair, Quantity, Text, Whole, as_written, point
+from ..keys import REQUIRED, Choice, Flag, Inline, Key, Listing, Number, Pair, Quantity, Text, Whole, as_written, point
 from ..table import Entries, TableKind
 from .filament_types import PRESETS as FILAMENT_PRESETS
 from .shapes import volume_within
@@ -81,6 +83,28 @@ class _Anchors:
         return {"anyOf": [points, numbers, _ANCHOR_REGION.schema()]}
 
 
+_AT_END_EXAMPLE = (
+    '{ end = "plus", range = "20 nm", binds_there = true, tracks = true, changes = ["free", "with formin"] }'
+)
+_AT_END = TableKind(
+    "filament_end",
+    (
+        Key("end", Choice(ENDS), REQUIRED, "Which one."),
+        Key("range", Quantity(units.LENGTH), REQUIRED, "How near to it a hand counts as there."),
+        Key("binds_there", Flag(), False, "Whether it binds there alone, and is at the end itself then."),
+        Key("tracks", Flag(), False, "Whether it stays at the end while that grows and shrinks."),
+        Key(
+            "changes",
+            Listing(Text('"free"'), "two names of states", '["free", "with formin"]', 2),
+            None,
+            "An end in the first state is in the second one as long as such a hand is there: names of plus_states or "
+            'minus_states of growth, or "growing" and "shrinking" of ends that do so in turn.',
+        ),
+    ),
+    "What a hand has to do with an end of filaments that grow, see `HandAtEnd`.",
+    owner="filament_end of the hand of [[linkers]]",
+)
+
 HAND = TableKind(
     "hand",
     (
@@ -89,6 +113,12 @@ HAND = TableKind(
         Key("walks_backward", Flag(), None, "Whether a load above the stall force drives it back."),
         Key("at_end", Choice(AT_ENDS), None, "What a hand does at the end of a filament."),
         Key("binds_to", _Names(), None, "Names of filament types; all if not given."),
+        Key(
+            "filament_end",
+            Inline(_AT_END, _AT_END_EXAMPLE),
+            None,
+            "What it has to do with an end of filaments that grow: formins, caps, depolymerases.",
+        ),
     ),
     "A hand, see `Hand`.",
     owner="the hand of [[linkers]]",
@@ -177,6 +207,10 @@ def read_linkers(entries, groups, box, seed, walls=()):
                 f"A hand binds to filaments of the type {' or '.join(hand.binds_to)}, but those of the "
                 f'configuration are {", ".join(names)}: change it, as in hand = {{ binds_to = "{names[0]}" }}.'
             )
+        if hand.filament_end is not None:
+            bound = [own.growth for own in groups if own.growth is not None and hand.binds(own.type)]
+            with entries.naming():
+                hand.filament_end.find_changes(bound)
     return group
 
 
@@ -234,6 +268,10 @@ def _hand(entries, changed):
     properties = entries.given(*HAND.names)
     if changed is None:
         entries.require("binding_rate", "reach", "unbinding_rate")
+    if "filament_end" in properties:
+        at_end = properties["filament_end"]
+        with at_end.naming():
+            properties["filament_end"] = HandAtEnd(**at_end.given(*_AT_END.names))
     with entries.naming():
         try:
             return Hand(**properties) if changed is None else dataclasses.replace(changed, **properties)

@@ -10,7 +10,7 @@ from ..keys import REQUIRED, Inline, Key, Listing, Quantity, Whole, direction
 from ..table import TableKind
 from .filament import MOST_NODES, reserve_group
 from .filament_types import TYPE_KEYS, read_filament_type
-from .monomers import GROWTH, GROWTH_EXAMPLE, read_growth
+from .growth import GROWTH, GROWTH_EXAMPLE, read_growth
 from .shapes import REGION, REGION_EXAMPLE, Region
 
 _WHICH = (
@@ -41,6 +41,7 @@ _OWN_TYPE = (
     Key("propulsion", Quantity(units.FORCE, "any"), None, "Without a table: as of [[filament]]."),
     *(dataclasses.replace(key, text=f"Without a table. {key.text}") for key in TYPE_KEYS),
 )
+_BORROWED = tuple(key.name for key in _OWN_TYPE)
 
 NUCLEATION = TableKind(
     "nucleation",
@@ -66,6 +67,7 @@ NUCLEATION = TableKind(
     "Filaments that are not there at first and begin at a rate, see `Nucleation`. A System cannot get more particles "
     "while it runs, so they have places. Their numbers come after those of all [[filament]] tables.",
     repeated=True,
+    borrowed=_BORROWED,
 )
 
 BRANCHING = TableKind(
@@ -107,6 +109,7 @@ BRANCHING = TableKind(
     ),
     "Filaments that begin on the side of others, at an angle, see `Branching`. Their minus ends should be capped.",
     repeated=True,
+    borrowed=_BORROWED,
 )
 
 _SHARED = ("length", "order")
@@ -164,14 +167,13 @@ def _group(entries, groups, solvent, monomers, nucleation):
 
 def _which(entries, groups, solvent, monomers):
     # Their type, their growth, and what else is that of their table.
-    own = [key.name for key in _OWN_TYPE]
     if "table" not in entries:
-        if not entries.given(*own):
+        if not entries.given(*_BORROWED):
             raise entries.error("does not say which filaments begin: add table = 1, or a type and its growth.")
         kind = read_filament_type(entries, solvent)
         entries.require("growth")
         return kind, read_growth(entries["growth"], monomers), {"propulsion": entries["propulsion"] or 0.0, "table": 0}
-    entries.refuse(own, "is that of the table whose number is given: leave one of them out.")
+    entries.refuse(_BORROWED, "is that of the table whose number is given: leave one of them out.")
     found = [group for group in groups if group.path == ("filament", entries["table"] - 1)]
     if not found:
         raise entries.at("table").error(f"is {entries['table']}, but there is no such [[filament]] table.")

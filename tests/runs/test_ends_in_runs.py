@@ -1,0 +1,321 @@
+"""What ends do in runs from files: states of one's own, ends that turn, hands at ends, tethers of capped ends."""
+
+import json
+
+import numpy as np
+import openmm
+import pytest
+
+from openmm_cylchain import ACTIN_ATP, MDIA1_ENDS, DynamicInstability, HandAtEnd, InputError, TwoUnitCap, analysis
+from openmm_cylchain.cli import main
+from openmm_cylchain.output.read_tables import read_reports
+from openmm_cylchain.runs.configuration import changed_keys, parse_configuration
+from openmm_cylchain.runs.run import begin, create_simulation
+from support.configurations import ENDS
+
+HEAD = '[solvent]\ntemperature = "298 K"\nviscosity = "1 mPa*s"\n'
+MONOMERS = '[[monomers]]\ntype = "ACTIN_ATP"\nconcentration = "5 uM"\n'
+AGING = MONOMERS.replace("ACTIN_ATP", "ACTIN_AGING")
+FILAMENT = '[[filament]]\ntype = "F_ACTIN"\nsegment_length = "108 nm"\nsegments = 5\ncount = 2\n'
+TAIL = '[simulation]\ntime_step = "1 ms"\nduration = "0.1 s"\nreport_interval = "10 ms"\n'
+FORMIN = 'plus_states = [{ name = "free" }, { name = "with formin", on_rate = "3 1/(uM*s)" }]'
+HANDS = """[[linkers]]
+stiffness = "0.1 pN/nm"
+rest_length = "10 nm"
+concentration = "1 uM"
+[linkers.hand]
+binding_rate = "1 1/s"
+reach = "10 nm"
+unbinding_rate = "1 1/s"
+"""
+TURNING = 'catastrophe_rate = "1 1/s", rescue_rate = "1 1/s", shrinking_off_rate = "1 1/s"'
+
+
+def growth_of(keys):
+    return f'growth = {{ longest = "1 um", {keys} }}\n'
+
+
+def parse(keys, *tables, monomers=MONOMERS, filament=FILAMENT):
+    return parse_configuration(HEAD + monomers + filament + growth_of(keys) + "".join(tables) + TAIL)
+
+
+def per_second(rates):
+    return np.array(rates) * 1e12
+
+
+def rates_of(turning):
+    return per_second([turning.catastrophe_rate, turning.rescue_rate, turning.shrinking_off_rate])
+
+
+def test_what_is_read_is_that_of_python():
+    configuration = parse_configuration(ENDS)
+    growth = configuration.filaments[0].growth
+    own = growth.states("plus")
+    assert own.names == ("free", "with formin", "in pause") and growth.keeps_first_node
+    np.testing.assert_allclose(np.array(own.on_rates) / ACTIN_ATP.plus_on_rate, [1.0, 3 / 11.6, 0.0])
+    np.testing.assert_allclose(per_second(own.off_rates), [1.4, 0.4, 0.0])
+    np.testing.assert_allclose(per_second(own.switch_rates), [[0, 0, 60], [0, 0, 0], [30, 0, 0]])
+    assert own.after_gain == own.after_loss == (0, 1, 2)
+    second = configuration.filaments[1].growth
+    assert second.plus_instability is None and isinstance(second.minus_instability, DynamicInstability)
+    assert rates_of(second.minus_instability) == pytest.approx([10.0, 20.0, 50.0])
+    assert second.minus_instability.shrinking_on_rate == pytest.approx(ACTIN_ATP.plus_on_rate / 116, rel=1e-9, abs=0.0)
+    third = configuration.filaments[2].growth.states("minus")
+    assert third.after_gain == third.after_loss == (1, 0) and per_second(third.off_rates) == pytest.approx([10.0, 10.0])
+    hand, other = configuration.linkers[0].kind.hands
+    assert other.filament_end is None and hand.filament_end == HandAtEnd(
+        end="plus", range=20.0, binds_there=True, tracks=True, changes=("free", "with formin")
+    )
+    keys = 'minus_hydrolysis_rate = "0.4 1/s", minus_shrinking_off_rate = "56 1/s", shrinking_on_rate = "1 1/(uM*s)", '
+    both = parse(keys + TURNING).filaments[0].growth
+    assert rates_of(both.plus_instability) == pytest.approx([1.0, 1.0, 1.0])
+    assert both.plus_instability.shrinking_on_rate == pytest.approx(ACTIN_ATP.plus_on_rate / 11.6, rel=1e-9, abs=0.0)
+    cap = both.minus_instability
+    assert isinstance(cap, TwoUnitCap) and cap.rescue_rate == 0.0
+    assert per_second([cap.hydrolysis_rate, cap.shrinking_off_rate]) == pytest.approx([0.4, 56.0])
+
+
+def test_a_preset_has_the_critical_concentration_of_free_ends():
+    """With mDia1, an end grows nine tenths as fast, and stands still where a free one does."""
+    own = parse('plus_states = "MDIA1_ENDS"').filaments[0].growth.states("plus")
+    assert own is MDIA1_ENDS and own.on_rates[0] == ACTIN_ATP.plus_on_rate
+    assert own.on_rates[1] == pytest.approx(0.9 * own.on_rates[0], rel=1e-12, abs=0.0)
+    ratios = np.array(own.off_rates) / own.on_rates
+    np.testing.assert_allclose(ratios, ACTIN_ATP.plus_off_rate / ACTIN_ATP.plus_on_rate)
+
+
+def test_changes_are_named():
+    first, second = parse(FORMIN), parse(FORMIN.replace('"3 ', '"2 '))
+    assert changed_keys(first, first) == [] and changed_keys(first, second) == ["[[filament]] number 1: growth"]
+
+
+def states(text):
+    return f'plus_states = [{{ name = "a", {text} }}, {{ name = "b" }}]'
+
+
+AT_END = 'filament_end = {{ end = "plus", range = "20 nm", {} }}\n'
+TETHER = '[[tether]]\nfilament = 0\nnode = 0\nstiffness = "1 pN/nm"\n'
+CAPPED = "minus_capped = true"
+
+
+@pytest.mark.parametrize(
+    ("message", "keys", "tables", "parts"),
+    [
+        ("growth plus_states must be a list of tables", "plus_states = []", (), {}),
+        ("plus_states must be one of MDIA1_ENDS, but is 'mDia1'", "plus_states = 'mDia1'", (), {}),
+        ("plus_states[0] lacks the key 'name'", 'plus_states = [{ off_rate = "1 1/s" }]', (), {}),
+        (
+            "plus_states[0] has an unknown key 'onrate'. Did you mean 'on_rate'?",
+            'plus_states = [{ name = "a", onrate = 1 }]',
+            (),
+            {},
+        ),
+        ("name is 'a', and so is another one", 'plus_states = [{ name = "a" }, { name = "a" }]', (), {}),
+        ("without commas and quotes, but is 'a, b'", 'plus_states = [{ name = "a, b" }]', (), {}),
+        ("on_rate has the unit", states('on_rate = "1 1/s"'), (), {}),
+        ("switch_rates must be a table of rates by names of states", states('switch_rates = "1 1/s"'), (), {}),
+        ("plus_states[0] switch_rates 'b' must be", states("switch_rates = { b = 3 }"), (), {}),
+        ("switch_rates is 'bb', but the states are a, b. Did you", states('switch_rates = { bb = "3 1/s" }'), (), {}),
+        ("has 'a', which is the state itself", states('switch_rates = { a = "3 1/s" }'), (), {}),
+        ("after_gain is 'c', but the states are a, b", states('after_gain = "c"'), (), {}),
+        ("after_loss is 'c', but the states are a, b", states('after_loss = "c"'), (), {}),
+        ("catastrophe_rate cannot be with plus_states", f"{FORMIN}, {TURNING}", (), {}),
+        ("plus_states cannot be with plus_capped = true", f"{FORMIN}, plus_capped = true", (), {}),
+        (
+            "minus_rescue_rate cannot be with minus_capped",
+            'minus_rescue_rate = "1 1/s", minus_capped = true',
+            (),
+            {},
+        ),
+        ("plus_states cannot be with monomers that age", FORMIN, (), {"monomers": AGING}),
+        (
+            "shrinking_on_rate cannot be with hydrolysis_rate",
+            'hydrolysis_rate = "1 1/s", shrinking_off_rate = "1 1/s", shrinking_on_rate = "1 1/(uM*s)"',
+            (),
+            {},
+        ),
+        (
+            "minus_catastrophe_rate cannot be with minus_hydrolysis_rate",
+            'minus_hydrolysis_rate = "1 1/s", minus_catastrophe_rate = "1 1/s"',
+            (),
+            {},
+        ),
+        ("lacks the key 'minus_shrinking_off_rate'", 'minus_hydrolysis_rate = "1 1/s"', (), {}),
+        ("lacks the key 'minus_catastrophe_rate': an end", 'minus_rescue_rate = "1 1/s"', (), {}),
+        ("hand filament_end lacks the key 'range'", FORMIN, (HANDS, 'filament_end = { end = "plus" }\n'), {}),
+        ("changes must be a list of two names", FORMIN, (HANDS, AT_END.format('changes = ["free"]')), {}),
+        ("two different states", FORMIN, (HANDS, AT_END.format('changes = ["free", "free"]')), {}),
+        (
+            "to 'slow', but the states are free, with formin",
+            FORMIN,
+            (HANDS, AT_END.format('changes = ["free", "slow"]')),
+            {},
+        ),
+        (
+            "others have growing, shrinking",
+            FORMIN,
+            (
+                '[[filament]]\ntype = "MICROTUBULE"\nsegment_length = "108 nm"\nsegments = 3\n',
+                growth_of(TURNING),
+                HANDS,
+                'binds_to = "F_ACTIN"\n',
+                AT_END.format('changes = ["free", "with formin"]'),
+            ),
+            {},
+        ),
+        (
+            "binds to no filaments that grow",
+            FORMIN,
+            (
+                '[[filament]]\ntype = "MICROTUBULE"\nsegments = 3\n',
+                HANDS,
+                'binds_to = "MICROTUBULE"\n',
+                AT_END.format("tracks = true"),
+            ),
+            {},
+        ),
+        ("tethers hold the first node alone", FORMIN, (TETHER,), {}),
+        ("tethers hold the first node alone", CAPPED, (TETHER.replace("node = 0", "node = -1"),), {}),
+        ("which is not there at times", f"{CAPPED}, vanishes = true", (TETHER,), {}),
+        (
+            "which is not there at times",
+            f'{CAPPED}, severing_rate = "1 1/(um*s)"',
+            ("reserve = 3\n", TETHER.replace("filament = 0", "filament = 4")),
+            {},
+        ),
+        ("cannot be as yet", CAPPED, (TETHER, 'velocity = ["1 um/s", "0 um/s", "0 um/s"]\n'), {}),
+    ],
+)
+def test_what_does_not_go_together_is_refused(message, keys, tables, parts):
+    with pytest.raises(InputError) as caught:
+        parse(keys, *tables, **parts)
+    assert message in str(caught.value) and str(caught.value).startswith("line "), caught.value
+
+
+def test_tethers_of_a_table_leave_out_places_for_parts():
+    configuration = parse(
+        f'{CAPPED}, severing_rate = "1 1/(um*s)"', "reserve = 3\n", TETHER.replace("filament = 0", "table = 1")
+    )
+    assert configuration.tethers[0].filaments == (0, 1)
+
+
+@pytest.fixture(scope="module")
+def directory(tmp_path_factory):
+    path = tmp_path_factory.mktemp("ends")
+    (path / "ends.toml").write_text(ENDS)
+    assert main(["run", str(path / "ends.toml"), "--output", str(path / "out")]) == 0
+    return path / "out"
+
+
+def test_tables_name_states(directory):
+    configuration = parse_configuration(ENDS)
+    simulation, built = create_simulation(configuration)
+    begin(configuration, simulation, built)
+    simulation.context.loadCheckpoint((directory / "checkpoint.chk").read_bytes().partition(b"\n")[2])
+    growth = built.filaments.in_context(simulation.context).growth()
+    table = read_reports(directory / "growth.csv")
+    for end, which in enumerate(("minus", "plus")):
+        np.testing.assert_array_equal(table[f"{which} end state"][-1], growth.state_names[:, end])
+    plus, minus = table["plus end state"], table["minus end state"]
+    assert set(plus[:, :6].ravel()) == {"free", "with formin", "in pause"} and set(minus[:, :6].ravel()) == {"capped"}
+    assert set(plus[:, 6:10].ravel()) == {"growing"} and set(plus[:, 10]) == {"capped"}
+    assert set(minus[:, 6:10].ravel()) == {"growing", "shrinking"} and set(minus[:, 10]) == {"odd", "even"}
+    np.testing.assert_array_equal(table["minus end shrinking"] == 1, minus == "shrinking")
+    # Every monomer turns odd to even.
+    events = table["minus end gained (monomers)"] + table["minus end lost (monomers)"]
+    np.testing.assert_array_equal(events[:, 10] % 2 == 1, minus[:, 10] == "even")
+    np.testing.assert_array_equal(analysis.load(directory).growth["plus end state"], plus)
+
+
+def test_summary_names_states(directory, capsys):
+    content = json.loads((directory / "summary.json").read_text())["growth"]
+    found = {own["name"] + own["end"]: {one["name"]: one for one in own["states"]} for own in content}
+    first, second = found["6 × ACT, 4 segmentsplus"], found["4 × MT, 3 segmentsminus"]
+    assert list(first) == ["free", "with formin", "in pause"] and first["with formin"]["share"] > 0.2
+    assert sum(own["share"] for own in first.values()) == pytest.approx(1.0)
+    assert second["shrinking"]["share_of_free_ends"] == pytest.approx(1 / 3)
+    assert found["4 × MT, 3 segmentsplus"] == {}
+    assert main(["run", str(directory / "configuration.toml"), "--output", str(directory), "--resume"]) == 0
+    said = capsys.readouterr().out
+    assert "6 × ACT, 4 segments, plus ends: with formin" in said and "1 × MT, 3 segments, minus end: even" in said
+
+
+def test_tethers_hold_first_nodes(directory):
+    """Their mean square distance from where they began: 3 k_BT/k."""
+    trajectory = analysis.load(directory)
+    nodes = [own.nodes[0] for own in trajectory.filaments[:6]]
+    first = trajectory.positions(0)[nodes]
+    squares = [np.sum((trajectory.positions(frame)[nodes] - first) ** 2, axis=1) for frame in range(5, 21)]
+    expected = 3 * 1.380649e-2 * 298 / 0.5
+    # Sixteen frames of six filaments: rather a look than a measurement, which tests of Python have.
+    assert 0.5 * expected < np.mean(squares) < 2.0 * expected
+
+
+CYCLE = (
+    HEAD.replace("1 mPa", "1000 mPa")
+    + MONOMERS.replace("5 uM", "10 uM")
+    + '[[monomers]]\nname = "rings"\nlength = "8 nm"\nminus_on_rate = "1 1/(uM*s)"\nconcentration = "10 uM"\n'
+    + FILAMENT.replace("segments = 5\ncount = 2", "segments = 3\ncount = 200")
+    + """[filament.growth]
+monomers = "ACTIN_ATP"
+longest = "1.2 um"
+minus_capped = true
+plus_states = [
+    { name = "open", on_rate = "20 1/(uM*s)", off_rate = "0 1/s", after_gain = "shut" },
+    { name = "shut", on_rate = "0 1/(uM*s)", off_rate = "0 1/s", switch_rates = { loose = "50 1/s" } },
+    { name = "loose", on_rate = "0 1/(uM*s)", off_rate = "100 1/s", switch_rates.open = "300 1/s", after_loss = "open" }
+]
+[[filament]]
+type = "MICROTUBULE"
+segment_length = "160 nm"
+segments = 3
+count = 200
+[filament.growth]
+monomers = "rings"
+longest = "1.2 um"
+minus_catastrophe_rate = "20 1/s"
+minus_rescue_rate = "60 1/s"
+minus_shrinking_off_rate = "20 1/s"
+[simulation]
+time_step = "10 ms"
+duration = "1.2 s"
+report_interval = "40 ms"
+seed = 5
+platform = "CPU"
+threads = 1
+checks = false
+"""
+)
+
+
+def test_shares_of_time_in_states(tmp_path):
+    """A cycle is 5 ms open, 20 ms shut and 2.5 ms loose, and gains 3/4 of a monomer; minus ends shrink 20/80."""
+    (tmp_path / "cycle.toml").write_text(CYCLE)
+    assert main(["run", str(tmp_path / "cycle.toml"), "--output", str(tmp_path / "out")]) == 0
+    table = read_reports(tmp_path / "out" / "growth.csv")
+    late = slice(5, None)
+    for column, members, expected in (
+        ("plus end state", slice(0, 200), {"open": 5 / 27.5, "shut": 20 / 27.5, "loose": 2.5 / 27.5}),
+        ("minus end state", slice(200, None), {"growing": 0.75, "shrinking": 0.25}),
+    ):
+        names = table[column][late, members]
+        for name, share in expected.items():
+            found = np.mean(names == name, axis=0)
+            error = found.std(ddof=1) / np.sqrt(len(found))
+            assert abs(found.mean() - share) < 4 * error, (name, found.mean(), share, error)
+            assert share < 0.5 or 4 * error < 0.05 * share, (name, error)
+    gained = table["plus end gained (monomers)"] - table["plus end lost (monomers)"]
+    rates = (gained[-1] - gained[5])[:200] / (1.0 / 0.0275)
+    error = rates.std(ddof=1) / np.sqrt(200)
+    assert 4 * error < 0.05 * 0.75 and abs(rates.mean() - 0.75) < 4 * error
+    content = json.loads((tmp_path / "out" / "summary.json").read_text())["growth"]
+    free = {one["name"]: one["share_of_free_ends"] for own in content for one in own["states"]}
+    expected = {"open": 5 / 27.5, "shut": 20 / 27.5, "loose": 2.5 / 27.5, "growing": 0.75, "shrinking": 0.25}
+    assert free == pytest.approx(expected)
+    assert content[0]["rate_of_free_ends"] == pytest.approx(0.75 / 0.0275)
+
+
+def test_moving_tethers_are_refused_in_words():
+    simulation, built = create_simulation(parse_configuration(ENDS))
+    with pytest.raises(InputError, match="Tethers cannot move as yet"):
+        built.filaments.in_context(simulation.context).move_tether(0, openmm.Vec3(0, 0, 0))
