@@ -81,8 +81,8 @@ def _times(ends, concentration, fewest, first, most, monomer):
 
 
 def _rates_of_both(ends, concentration):
-    # Of each end, among the states of both, from a row to a column: by gains, by losses, by themselves, and of these what
-    # there is for each nm of length.
+    # Of each end, among the states of both, from a row to a column: by gains, by losses, by themselves, and of the last
+    # what there is for each nm of length.
     identities = [np.eye(len(own.names)) for own in ends]
     for place, own in enumerate(ends):
         count = np.arange(len(own.names))
