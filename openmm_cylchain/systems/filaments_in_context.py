@@ -330,8 +330,6 @@ class FilamentsInContext:
         return tether
 
     def _change_tethers(self, changed):
-        if any(self._placed.filaments[own.filament].growth is not None for own in self._placed.tethers):
-            raise InputError("Tethers cannot move as yet where one of them holds a filament that grows.")
         moved = {**self._moved_tethers, **changed}
         self._engine.set_tethers(self._context, self._placed, moved)
         self._moved_tethers.update(moved)

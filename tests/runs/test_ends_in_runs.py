@@ -152,18 +152,6 @@ CAPPED = "minus_capped = true"
             {},
         ),
         (
-            "others have growing, shrinking",
-            FORMIN,
-            (
-                '[[filament]]\ntype = "MICROTUBULE"\nsegment_length = "108 nm"\nsegments = 3\n',
-                growth_of(TURNING),
-                HANDS,
-                'binds_to = "F_ACTIN"\n',
-                AT_END.format('changes = ["free", "with formin"]'),
-            ),
-            {},
-        ),
-        (
             "binds to no filaments that grow",
             FORMIN,
             (
@@ -315,7 +303,6 @@ def test_shares_of_time_in_states(tmp_path):
     assert content[0]["rate_of_free_ends"] == pytest.approx(0.75 / 0.0275)
 
 
-def test_moving_tethers_are_refused_in_words():
+def test_tethers_of_filaments_that_grow_can_move():
     simulation, built = create_simulation(parse_configuration(ENDS))
-    with pytest.raises(InputError, match="Tethers cannot move as yet"):
-        built.filaments.in_context(simulation.context).move_tether(0, openmm.Vec3(0, 0, 0))
+    built.filaments.in_context(simulation.context).move_tether(0, openmm.Vec3(0, 0, 0))
