@@ -257,7 +257,8 @@ void CylinderChainBindingForceImpl::findHeldEnds(vector<cylchain::HeldEnd>& ends
             if (!place.isBound())
                 continue;
             const cylchain::HandAtEnd& own = system.hands[system.types[linker.type].hands[side]].atEnd;
-            if (own.heldState >= 0 && binary_search(own.changes.begin(), own.changes.end(), place.chain) && fabs(place.position-contours->getEnd(place.chain, own.end)) <= own.range)
+            if (own.heldState >= 0 && binary_search(own.changes.begin(), own.changes.end(), place.chain) &&
+                    fabs(place.position-contours->getEnd(place.chain, own.end)) <= own.range)
                 ends.push_back({place.chain, own.end, own.freeState, own.heldState});
         }
 }
