@@ -351,10 +351,8 @@ def _add_region(translation, table, options, whole, count):
     region = None if everywhere else region_of(text, draw)
     if region is None and not everywhere:
         return False
-    if not everywhere and space is not None and not space.edges:
-        share = _share_inside(options, draw, whole, text, direction)
-        if share < _LEAST_SHARE:
-            return False
+    if region is not None and _share_inside(region, draw, whole, text, direction) < _LEAST_SHARE:
+        return False
     table.add("count", count, Note(EXACT, "", options.line))
     if region is not None:
         table.add("inside", region, Note(NEAREST, "where all of a filament begins; in Cytosim, its middle"))
@@ -367,14 +365,18 @@ def _add_region(translation, table, options, whole, count):
     return True
 
 
-def _share_inside(options, draw, whole, text, direction):
-    found = 0
+def _share_inside(region, draw, whole, text, direction):
+    # How many of those that Cytosim draws are in the region as a whole.
+    from ..runs.keys import Place
+    from ..runs.tables.shapes import REGION, Region
+
+    inside, found = Region(REGION.read(region, Place("inside", ()))), 0
     for _ in range(_TRIALS):
         place = draw_inside(text, draw)
         if place is None:
             return 0.0
         ends = place + 0.5 * whole * np.outer([-1.0, 0.0, 1.0], draw_direction(direction, place, draw))
-        found += bool(np.all(draw.space.inside(ends)))
+        found += inside.contains(1e3 * ends)
     return found / _TRIALS
 
 

@@ -14,6 +14,9 @@ _STATES = {"white": 0, "green": 1, "yellow": 2, "orange": 3, "red": 4, "static":
 _STATES |= {"grow": 1, "growing": 1, "shrink": 4, "shrinking": 4}
 _STILL, _GROWING, _SHRINKING = 0, 1, 4
 _ENDS = ("plus", "minus")
+_KEYS = ("growing_speed", "shrinking_speed", "growing_force", "growing_off_speed", "total_polymer", "min_length")
+_KEYS += ("max_length", "persistent", "fate", "delete_stub", "rebirth_rate", "catastrophe_rate", "hydrolysis_rate")
+_KEYS += ("catastrophe_rate_stalled", "rescue_rate", "unit_length")
 _USUAL_MONOMER = 0.008
 _REFERENCE = 1.0
 """Concentration in uM at which all of the polymer is free."""
@@ -55,9 +58,8 @@ def read_growth(translation, fiber, options):
     settings = fiber.settings
     activity = settings.text("activity", default="none")
     states = {end: state_of(options, end) for end in _ENDS}
-    for key in ("growing_speed", "shrinking_speed", "growing_force", "growing_off_speed", "total_polymer"):
-        settings.values(key)
-    for key in ("min_length", "max_length", "persistent", "fate", "delete_stub", "rebirth_rate"):
+    # Those of other activities mean nothing in Cytosim either.
+    for key in _KEYS:
         settings.values(key)
     if activity in ("none", "fiber", ""):
         return None
