@@ -76,6 +76,8 @@ def read_growth(translation, fiber, options):
     if monomer is None:
         segment = settings.number("segmentation", default=1.0)
         monomer = segment / max(2, round(segment / _USUAL_MONOMER))
+    if not 0.0 < monomer < math.inf:
+        raise settings.mistake("unit_length" if "unit_length" in settings else "segmentation", "must be positive.")
     growing = Growing(fiber.name, settings, monomer)
     _LAWS[activity](translation, growing, states)
     if not growing.rates and len(growing.entries) > 1 and activity not in ("classic", "dynamic"):
