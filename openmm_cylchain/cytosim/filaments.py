@@ -164,6 +164,8 @@ def add_type(translation, table, fiber, segment, length):
     table.add("bending_model", "kratky-porod", Note(EXACT, "the energy of Cytosim's joints"))
     table.add("segment_length", quantity(segment, "um"), Note(EXACT, "", settings.line_of("segmentation")))
     radius = settings.number("drag_radius", "hydrodynamic_radius", default=0.0125)
+    if not 0.0 < radius < math.inf:
+        raise settings.mistake("drag_radius", "must be positive.")
     modulus = max(16.0 * rigidity / (2.0 * radius) ** 2, 1e4 * translation.thermal_energy / segment, 1000.0)
     note = Note(NEAREST, "Cytosim's fibers have no length but one: these stretch next to nothing")
     table.add("stretching_modulus", quantity(modulus, "pN"), note)
@@ -423,6 +425,7 @@ def _one_place(translation, options, whole, number, count):
         if place is None:
             # Cytosim says so too, and makes fewer.
             place = draw_inside(options.text("position"), draw, False)
+            options.set("placement", ["anywhere"], options.line)
             translation.document.note(
                 NEAREST, "places outside of the space, where Cytosim makes no fiber, are taken", options.line
             )

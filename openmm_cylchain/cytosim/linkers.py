@@ -192,9 +192,12 @@ def _points(translation, new, count, before):
         if first is not None and last is not None:
             places.append(np.array(first) + np.subtract(last, first) * number / max(1, count - 1))
             continue
-        # An anchor that is given lies where it is, also outside.
         place = draw_inside(text, draw, keep)
-        places.append(draw_inside(text, draw, False) if place is None else place)
+        if place is None:
+            text = f"{count - number} of {count} {new.name}: no place is in the space, and Cytosim makes none either"
+            translation.document.note(NEAREST, text, new.line)
+            break
+        places.append(place)
     return places
 
 

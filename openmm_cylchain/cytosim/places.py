@@ -185,7 +185,7 @@ def _within_plane(draw, numbers, letters):
 def _along_x(weight):
     def place(draw, numbers, _):
         first, second = (*numbers, -10.0, 10.0)[:2] if numbers else (-10.0, 10.0)
-        for _ in range(100 * _TRIES):
+        for _ in range(_TRIES):
             own = draw.inside()
             if draw.generator.uniform() < weight(own[0], first, second):
                 return own

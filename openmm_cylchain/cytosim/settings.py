@@ -74,8 +74,10 @@ class Settings:
         return default if text is None else as_number(text, self._line_among(places), self._what(places))
 
     def vector(self, key, index=0, default=None):
-        """Three numbers; what is not given is zero."""
+        """Three numbers; what is not given is zero. ScriptError if a key that is there has no such value."""
         text = self.text((key, index))
+        if text is None and default is None and key in self:
+            raise self.mistake(key, f"must have a vector, as in {key} = 1 0 0")
         return default if text is None else as_vector(text, self.line_of(key), f"{key} of {self.label}")
 
     def flag(self, *places, default=False):

@@ -54,7 +54,7 @@ def contact_diameter(script):
 def _steric_radius(settings):
     if settings.text("steric") in _FREE:
         return 0.0
-    return settings.number(("steric", 1), "steric_radius", default=0.0)
+    return max(0.0, settings.number(("steric", 1), "steric_radius", default=0.0))
 
 
 def add_contacts(translation):
