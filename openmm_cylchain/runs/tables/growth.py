@@ -241,10 +241,6 @@ def check_with_others(tables, configuration, settings):
     for entries, own in zip(tables["tether"], configuration.tethers):
         for number in own.filaments:
             _check_tether(entries, number, own.node, groups)
-    held = [number for own in configuration.tethers for number in own.filaments]
-    if any(group_of(number, groups).growth is not None for number in held):
-        for entries in tables["tether"]:
-            entries.refuse(("velocity",), "cannot be as yet where a tether holds a filament that grows: leave it out.")
     for entries, own in zip(tables["link"], configuration.links):
         if own.between is None:
             raise entries.at("within").error("may join filaments that grow, which links do not yet: give between.")
