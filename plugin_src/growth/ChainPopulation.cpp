@@ -26,7 +26,7 @@ void ChainPopulation::listNucleation(const GrowthState& state, int number, vecto
         events.push_back({GrowthEvent::Nucleate, number, rate});
 }
 
-void ChainPopulation::listEvents(const GrowthState& state, int index, ChainsInStep& chains,
+void ChainPopulation::listEvents(const GrowthState& state, int index, const ChainsInStep& chains,
         vector<GrowthEvent>& events) const {
     const GrowingChain& own = system.chains[index];
     const int monomers = state.ranges[index].size();
@@ -39,14 +39,14 @@ void ChainPopulation::listEvents(const GrowthState& state, int index, ChainsInSt
     }
     if (own.severing.rate > 0)
         events.push_back({GrowthEvent::Sever, index, own.severing.rate*(monomers-1)});
-    for (const SeveringHand& hand : chains.getSeveringHands()) {
-        // A hand that is at an end, or where it has cut already, cuts no more.
+    chains.forSeveringHands(index, [&] (const SeveringHand& hand) {
+        // One that is at an end, or where it has cut already, cuts no more.
         const int monomer = static_cast<int>(round(hand.position/shapes.getMonomerLength(index)));
-        if (hand.chain != own.chain || monomer <= state.ranges[index].first || monomer >= state.ranges[index].last)
-            continue;
+        if (monomer <= state.ranges[index].first || monomer >= state.ranges[index].last)
+            return;
         events.push_back({GrowthEvent::Sever, index, hand.rate});
         events.back().monomer = monomer;
-    }
+    });
 }
 
 int ChainPopulation::apply(GrowthState& state, const GrowthStep& step, const GrowthEvent& event, double time,

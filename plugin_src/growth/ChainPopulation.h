@@ -21,7 +21,8 @@ public:
     ChainPopulation(const GrowthSystem& system, ChainShapes& shapes) : system(system), shapes(shapes) {
     }
     /** Add what may happen to a chain as a whole. */
-    void listEvents(const GrowthState& state, int index, ChainsInStep& chains, std::vector<GrowthEvent>& events) const;
+    void listEvents(const GrowthState& state, int index, const ChainsInStep& chains,
+            std::vector<GrowthEvent>& events) const;
     /** Add that a nucleator begins a chain. */
     void listNucleation(const GrowthState& state, int nucleator, std::vector<GrowthEvent>& events) const;
     /**

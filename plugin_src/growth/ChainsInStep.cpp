@@ -63,6 +63,20 @@ void ChainsInStep::move(int index, int other, double beyond) {
         all->move(system.chains[index].chain, system.chains[other].chain, beyond);
 }
 
+void ChainsInStep::addCut(const ChainCut& cut, GrowthChanges& changes) {
+    changes.cuts.push_back(cut);
+    const auto found = hands.find(cut.chain);
+    if (found == hands.end())
+        return;
+    vector<SeveringHand> before;
+    before.swap(found->second);
+    for (SeveringHand& hand : before) {
+        followCut(cut, hand);
+        if (hand.chain >= 0)
+            hands[hand.chain].push_back(hand);
+    }
+}
+
 void ChainsInStep::finish(const GrowthState& state, ChainList& list, double* all, GrowthChanges& changes) const {
     for (size_t i = 0; i < present.size(); i++) {
         if (!present[i].hasChanged)

@@ -6,6 +6,7 @@
 #include "growth/GrowthSystem.h"
 #include "kinetics/RandomNumbers.h"
 #include "mechanics/ChainList.h"
+#include <map>
 #include <vector>
 
 namespace cylchain {
@@ -19,7 +20,9 @@ public:
     /** @param around  what chains feel */
     ChainsInStep(const GrowthSystem& system, const GrowthStep& step, const ChainList& chains, const double* positions,
             const std::vector<Surroundings*>& around) : system(system), step(step), chains(chains),
-            positions(positions), around(around), present(system.chains.size()), hands(step.severingHands) {
+            positions(positions), around(around), present(system.chains.size()) {
+        for (const SeveringHand& hand : step.severingHands)
+            hands[hand.chain].push_back(hand);
     }
     const Chain& getChain(int index) const {
         return chains.getChain(system.chains[index].chain);
@@ -47,16 +50,15 @@ public:
     void set(int index, const std::vector<Vec3d>& nodes);
     /** Let what is beyond a length along a chain belong to another one, as others see it. */
     void move(int index, int other, double beyond);
-    /** Get the hands that cut. */
-    const std::vector<SeveringHand>& getSeveringHands() const {
-        return hands;
+    /** Call a function of each hand that cuts a growing chain. */
+    template <class Function> void forSeveringHands(int index, Function function) const {
+        const auto found = hands.find(system.chains[index].chain);
+        if (found != hands.end())
+            for (const SeveringHand& hand : found->second)
+                function(hand);
     }
     /** Take note of a cut. */
-    void addCut(const ChainCut& cut, GrowthChanges& changes) {
-        changes.cuts.push_back(cut);
-        for (SeveringHand& hand : hands)
-            followCut(cut, hand);
-    }
+    void addCut(const ChainCut& cut, GrowthChanges& changes);
     /** Set the chains and the positions that have changed. */
     void finish(const GrowthState& state, ChainList& list, double* all, GrowthChanges& changes) const;
 private:
@@ -66,12 +68,13 @@ private:
     };
     void beginAround();
     const GrowthSystem& system;
-    const GrowthStep step;
+    const GrowthStep& step;
     const ChainList& chains;
     const double* positions;
     const std::vector<Surroundings*>& around;
     std::vector<Present> present;
-    std::vector<SeveringHand> hands;
+    /** Those that cut, by the numbers of chains. */
+    std::map<int, std::vector<SeveringHand> > hands;
     /** Whether what is around has taken note of the step. */
     bool aroundIsKnown = false;
 };

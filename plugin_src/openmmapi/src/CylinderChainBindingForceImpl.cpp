@@ -250,33 +250,32 @@ void CylinderChainBindingForceImpl::findChangesOfEnds(vector<cylchain::HeldEnd>&
             ends.push_back({chain, hand.atEnd.end, hand.atEnd.freeState, hand.atEnd.heldState});
 }
 
-void CylinderChainBindingForceImpl::findHeldEnds(vector<cylchain::HeldEnd>& ends) {
+/** Call a function of the kind and the place of each hand that is bound. */
+template <class Function> void CylinderChainBindingForceImpl::forBoundHands(Function function) {
     for (const cylchain::Linker& linker : getState().linkers)
-        for (int side = 0; side < 2; side++) {
-            const cylchain::HandPlace& place = linker.hands[side];
-            if (!place.isBound())
-                continue;
-            const cylchain::HandAtEnd& own = system.hands[system.types[linker.type].hands[side]].atEnd;
-            if (own.heldState >= 0 && binary_search(own.changes.begin(), own.changes.end(), place.chain) &&
-                    fabs(place.position-contours->getEnd(place.chain, own.end)) <= own.range)
-                ends.push_back({place.chain, own.end, own.freeState, own.heldState});
-        }
+        for (int side = 0; side < 2; side++)
+            if (linker.hands[side].isBound())
+                function(system.hands[system.types[linker.type].hands[side]], linker.hands[side]);
+}
+
+void CylinderChainBindingForceImpl::findHeldEnds(vector<cylchain::HeldEnd>& ends) {
+    forBoundHands([&] (const cylchain::Hand& hand, const cylchain::HandPlace& place) {
+        const cylchain::HandAtEnd& own = hand.atEnd;
+        if (own.heldState >= 0 && binary_search(own.changes.begin(), own.changes.end(), place.chain) &&
+                fabs(place.position-contours->getEnd(place.chain, own.end)) <= own.range)
+            ends.push_back({place.chain, own.end, own.freeState, own.heldState});
+    });
 }
 
 void CylinderChainBindingForceImpl::findSeveringHands(vector<cylchain::SeveringHand>& hands) {
-    if (none_of(system.hands.begin(), system.hands.end(), [] (const cylchain::Hand& hand) {
+    const bool anyCuts = any_of(system.hands.begin(), system.hands.end(), [] (const cylchain::Hand& hand) {
         return hand.severingRate > 0;
-    }))
-        return;
-    for (const cylchain::Linker& linker : getState().linkers)
-        for (int side = 0; side < 2; side++) {
-            const cylchain::HandPlace& place = linker.hands[side];
-            if (!place.isBound())
-                continue;
-            const double rate = system.hands[system.types[linker.type].hands[side]].severingRate;
-            if (rate > 0)
-                hands.push_back({place.chain, place.position, rate});
-        }
+    });
+    if (anyCuts)
+        forBoundHands([&] (const cylchain::Hand& hand, const cylchain::HandPlace& place) {
+            if (hand.severingRate > 0)
+                hands.push_back({place.chain, place.position, hand.severingRate});
+        });
 }
 
 /** Hold chains that have begun as branches, where both are still there at the end of the step. */

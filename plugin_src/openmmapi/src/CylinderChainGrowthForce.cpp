@@ -24,6 +24,12 @@ static bool isRate(double value) {
     return value >= 0 && isfinite(value);
 }
 
+/** Get an end of a chain; a const one of a const chain. */
+template <class Chain> static auto& endOf(Chain& chain, int end) {
+    requireOfGrowth(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
+    return chain.ends[end];
+}
+
 CylinderChainGrowthForce::CylinderChainGrowthForce() {
     setName("CylinderChainGrowthForce");
 }
@@ -138,8 +144,8 @@ const GrowingChain& CylinderChainGrowthForce::getOwn(int index) const {
 void CylinderChainGrowthForce::setEndStates(int index, int end, int initialState, const vector<double>& parameters,
         const vector<int>& numbers, const vector<double>& loads) {
     GrowingChain& chain = getOwn(index);
+    GrowingEnd& before = endOf(chain, end);
     const size_t count = parameters.size()/2;
-    requireOfGrowth(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
     requireOfGrowth(count >= 1 && parameters.size() == 2*count && numbers.size() == 2*count &&
             loads.size() == count*count, "There must be two rates and two numbers for each state of an end, and a rate "
             "from each to each");
@@ -153,20 +159,19 @@ void CylinderChainGrowthForce::setEndStates(int index, int end, int initialState
                 " cannot be negative and must be finite");
     GrowingEnd own;
     own.states.clear();
-    own.timing = chain.ends[end].timing;
+    own.timing = before.timing;
     own.initialState = initialState;
     for (size_t i = 0; i < count; i++) {
         vector<double> rates(loads.begin()+i*count, loads.begin()+(i+1)*count);
         requireOfGrowth(rates[i] == 0, "No state can change to itself");
         own.states.push_back({parameters[2*i], parameters[2*i+1], numbers[2*i], numbers[2*i+1], rates, {}, 0});
     }
-    chain.ends[end] = move(own);
+    before = move(own);
 }
 
 void CylinderChainGrowthForce::getEndStates(int index, int end, int& initialState, vector<double>& parameters,
         vector<int>& numbers, vector<double>& loads) const {
-    requireOfGrowth(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
-    const GrowingEnd& own = getOwn(index).ends[end];
+    const GrowingEnd& own = endOf(getOwn(index), end);
     initialState = own.initialState;
     parameters.clear();
     numbers.clear();
@@ -181,8 +186,7 @@ void CylinderChainGrowthForce::getEndStates(int index, int end, int& initialStat
 
 void CylinderChainGrowthForce::setEndSwitching(int index, int end, const vector<double>& lengths,
         const vector<double>& rates) {
-    requireOfGrowth(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
-    vector<EndState>& states = getOwn(index).ends[end].states;
+    vector<EndState>& states = endOf(getOwn(index), end).states;
     const size_t count = states.size();
     requireOfGrowth(lengths.size() == count && rates.size() == count*count, "There must be a length for each state of "
             "an end, and a rate from each to each");
@@ -200,8 +204,7 @@ void CylinderChainGrowthForce::setEndSwitching(int index, int end, const vector<
 
 void CylinderChainGrowthForce::getEndSwitching(int index, int end, vector<double>& lengths,
         vector<double>& rates) const {
-    requireOfGrowth(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
-    const vector<EndState>& states = getOwn(index).ends[end].states;
+    const vector<EndState>& states = endOf(getOwn(index), end).states;
     lengths.clear();
     rates.clear();
     for (const EndState& state : states) {
@@ -212,15 +215,14 @@ void CylinderChainGrowthForce::getEndSwitching(int index, int end, vector<double
 }
 
 void CylinderChainGrowthForce::setEndTiming(int index, int end, bool isRegular, double energy) {
-    requireOfGrowth(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
     requireOfGrowth(isRate(energy), "The energy of loads cannot be negative and must be finite");
-    getOwn(index).ends[end].timing = {isRegular, energy};
+    endOf(getOwn(index), end).timing = {isRegular, energy};
 }
 
 void CylinderChainGrowthForce::getEndTiming(int index, int end, bool& isRegular, double& energy) const {
-    requireOfGrowth(end == 0 || end == 1, "An end is 0 or 1, minus or plus, but is "+to_string(end));
-    isRegular = getOwn(index).ends[end].timing.isRegular;
-    energy = getOwn(index).ends[end].timing.energyOfLoad;
+    const EndTiming& own = endOf(getOwn(index), end).timing;
+    isRegular = own.isRegular;
+    energy = own.energyOfLoad;
 }
 
 void CylinderChainGrowthForce::setMonomersHaveStates(int index, bool monomersHaveStates) {

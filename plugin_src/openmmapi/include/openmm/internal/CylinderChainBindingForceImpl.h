@@ -70,6 +70,7 @@ public:
     StateColumns storeState(bool inCheckpoint);
     void restoreState(const StateColumns& columns);
 private:
+    template <class Function> void forBoundHands(Function function);
     bool addBranches(const cylchain::GrowthChanges& changes);
     bool removeBrokenBranches();
     void follow() const;
