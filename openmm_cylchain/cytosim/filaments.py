@@ -10,7 +10,6 @@ from .document import EXACT, NEAREST, Note, point, quantity
 from .grammar import ScriptError
 from .growth import longest_of, read_growth, same_growth
 from .places import (
-    Draw,
     UnknownDirectionError,
     draw_direction,
     draw_inside,
@@ -54,7 +53,7 @@ def add_filaments(translation, new):
     growing = shared_growth(translation, fiber, options)
     for key in ("length", "plus_end", "minus_end", "end_state", "mark"):
         options.values(key)
-    shape = _shape(translation, options, lengths[0])
+    shape = _shape(translation, options)
     if shape is not None:
         for _ in range(count):
             _add_shape(translation, fiber, options, shape, growing)
@@ -115,13 +114,13 @@ def _lengths(fiber, options):
     return [float(own) for own in lower + shares * (upper - lower)]
 
 
-def _shape(translation, options, length):
+def _shape(translation, options):
     # Points that a fiber begins with, as (n, 3), or None.
     for key in ("shape", "points"):
         if key not in options:
             continue
         if options.text(key) == "curved":
-            return _arc(options, length)
+            raise ScriptError(options.line_of("shape"), "the shape curved is not known here.")
         points = np.array([options.vector(key, index) for index in range(len(options.values(key)))])
         if len(points) < 2 or np.any(np.linalg.norm(np.diff(points, axis=0), axis=1) == 0.0):
             raise options.mistake(key, "must be points that differ, separated by commas.")
@@ -129,10 +128,6 @@ def _shape(translation, options, length):
             points[:, 2] = 0.0
         return points
     return None
-
-
-def _arc(options, length):
-    raise ScriptError(options.line_of("shape"), "the shape curved is not known here.")
 
 
 def segment_of(fiber, length, growing):
@@ -279,7 +274,7 @@ def _with_equal_steps(nodes, segment):
 
 
 def _placed(translation, options, nodes):
-    draw = Draw(translation.space(), translation.dimensions, translation.generator, options.line)
+    draw = translation.draw_in(translation.space(), options.line)
     if "position" not in options and "direction" not in options and "orientation" not in options:
         translation.document.note(NEAREST, "a fiber with a shape stays where its points are", options.line)
         return nodes
@@ -319,7 +314,7 @@ def _read_placement(translation, options):
             f"positions: {word}",
         )
         options.set("position", ["inside"], options.line_of("position"))
-    draw = Draw(_own_space(translation, options), translation.dimensions, translation.generator, options.line)
+    draw = translation.draw_in(_own_space(translation, options), options.line)
     for key in ("direction", "orientation"):
         try:
             draw_direction(options.text(key), np.array([0.3, 0.2, 0.0]), draw)
@@ -347,7 +342,7 @@ def _add_region(translation, table, options, whole, count):
     if direction not in (None, "random") and fixed is None:
         return False
     space = _own_space(translation, options)
-    draw = Draw(space, translation.dimensions, translation.generator, options.line)
+    draw = translation.draw_in(space, options.line)
     text = options.text("position")
     everywhere = text in (None, "inside") and space is not None and space.shape == "periodic"
     region = None if everywhere else region_of(text, draw)
@@ -407,7 +402,7 @@ def _remove(table, keys):
 
 def _one_place(translation, options, whole, number, count):
     space = _own_space(translation, options)
-    draw = Draw(space, translation.dimensions, translation.generator, options.line)
+    draw = translation.draw_in(space, options.line)
     direction = options.text("direction", "orientation")
     key = "position_range" if "position_range" in options else "range"
     placement = options.text("placement", default="inside")

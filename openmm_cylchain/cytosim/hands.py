@@ -2,14 +2,14 @@
 
 import math
 
-from .document import EXACT, NEAREST, Note, quantity
+from .document import EXACT, LEFT_OUT, NEAREST, Note, quantity
+from .settings import OFF
 
 _PLAIN, _MOTORS, _ON_SITES = ("bind", "none", ""), ("move", "motor"), ("walk", "digit")
 _NEAR_ENDS = "hands near ends"
 _OF_ACTIVITY = {"slide": "hands that slip along filaments", "track": _NEAR_ENDS}
 _LEAST_REACH = 0.001
 _EVERY_KEY = 2**32 - 1
-_OFF = (None, "0", "off", "none")
 
 
 class HandRead:
@@ -64,7 +64,7 @@ def _read_activity(hand, settings):
         needs = _OF_ACTIVITY.get(activity, f"hands: {activity}")
         # What else it has is of that activity.
         settings.take_rest()
-        hand.note("left out", f"activity = {activity}", settings.line_of("activity"), needs)
+        hand.note(LEFT_OUT, f"activity = {activity}", settings.line_of("activity"), needs)
         return
     speed = settings.number("unloaded_speed", "speed", "max_speed", default=0.0)
     stall = settings.number("stall_force", "force", default=math.inf)
@@ -84,21 +84,21 @@ def _read_activity(hand, settings):
 
 
 def _read_ends(translation, hand, settings):
-    if settings.text("bind_only_end", "bind_end") not in _OFF:
+    if settings.text("bind_only_end", "bind_end") not in OFF:
         settings.values("bind_end_range")
         settings.values("bind_only_free_end")
-        hand.note("left out", "bind_only_end", settings.line_of("bind_only_end"), _NEAR_ENDS)
-    if settings.text("bind_also_end", "bind_also_ends") not in _OFF:
+        hand.note(LEFT_OUT, "bind_only_end", settings.line_of("bind_only_end"), _NEAR_ENDS)
+    if settings.text("bind_also_end", "bind_also_ends") not in OFF:
         hand.note(EXACT, "it binds at ends as well, as all of ours do", settings.line_of("bind_also_end"))
     forward = not hand.table.get("speed", "0").startswith("-")
     holds = settings.number(("hold_growing_end", 0 if forward else 1), "hold_growing_ends", default=0.0)
     if "speed" in hand.table and holds > 0.0:
         hand.table["at_end"] = "hold"
         if holds < 1.0:
-            hand.note("left out", f"a chance of {holds:g} to stay at an end", settings.line, _NEAR_ENDS)
+            hand.note(LEFT_OUT, f"a chance of {holds:g} to stay at an end", settings.line, _NEAR_ENDS)
     shrinking = [settings.number(("hold_shrinking_end", own), default=0.0) for own in (0, 1)]
     if any(shrinking) and translation.growings:
-        hand.note("left out", "hold_shrinking_end", settings.line_of("hold_shrinking_end"), _NEAR_ENDS)
+        hand.note(LEFT_OUT, "hold_shrinking_end", settings.line_of("hold_shrinking_end"), _NEAR_ENDS)
 
 
 def _read_keys(translation, hand, settings):

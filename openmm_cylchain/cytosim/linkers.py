@@ -8,8 +8,9 @@ import numpy as np
 from .attached import GROWING, PLACED
 from .document import EXACT, LEFT_OUT, NEAREST, Note, point, quantity
 from .hands import read_hand
-from .places import Draw, draw_inside, unknown_position
+from .places import draw_inside, unknown_position
 from .script import count_of
+from .settings import OFF
 
 _DIFFUSION, _PAIRS = "linkers that diffuse by themselves", "rules for pairs of hands"
 _MOST_ANCHORS = 50_000
@@ -185,7 +186,7 @@ def _points(translation, new, count, before):
         translation.left_out(f"{count} {new.name} at {text!r}", options.line_of("position"), f"positions: {word}")
         return []
     space = translation.space(options.text(("position", 1)))
-    draw = Draw(space, translation.dimensions, translation.generator, new.line)
+    draw = translation.draw_in(space, new.line)
     keep, places = options.text("placement", default="inside") == "inside", []
     first, last = (options.vector("range", own) for own in (0, 1))
     for number in range(count):
@@ -249,7 +250,7 @@ def _couple_table(translation, own, linked):
         settings.take_rest()
         table.comment(Note(LEFT_OUT, f"activity = {activity}", settings.line_of("activity"), _COUPLES[activity]))
     for key in ("specificity", "trans_activated"):
-        if settings.text(key) not in (None, "0", "off", "none"):
+        if settings.text(key) not in OFF:
             text = f"{key} = {settings.text(key)}"
             table.comment(Note(LEFT_OUT, text, settings.line_of(key), _PAIRS))
     for note in dict.fromkeys(hands[0].notes + hands[1].notes):
@@ -286,8 +287,7 @@ def _add_count(translation, table, own, linked, hand):
         table.comment(Note(LEFT_OUT, "confine = on", settings.line_of("confine"), "surfaces: linkers on one"))
     if settings.number(("fast_diffusion", 1), default=0.0) > 0.0:
         table.comment(Note(LEFT_OUT, "a reservoir of a fixed number", settings.line, "linkers: reservoirs"))
-    name = settings.text(("confine", 2), "confine_spec")
-    space = translation.space(None if name in ("first", "last") else name)
+    space = translation.space(settings.confining_space())
     if space is None or space.volume is None:
         if translation.document.tables_called("[box]"):
             return

@@ -5,7 +5,7 @@ import math
 from .document import EXACT, NEAREST, Note, quantity
 from .filaments import add_growth, add_type, first_length, segment_of, shared_growth
 from .grammar import read_commands
-from .places import Draw, fixed_direction, region_of
+from .places import fixed_direction, region_of
 from .settings import Settings
 
 _EVENTS = "events during a run"
@@ -48,7 +48,7 @@ def _begins(translation, new, command, rate):
     options = Settings.of(f"new {fiber.name}", command.line, command.block)
     growing = shared_growth(translation, fiber, options)
     space = translation.space(options.text(("position", 1)))
-    draw = Draw(space, translation.dimensions, translation.generator, command.line)
+    draw = translation.draw_in(space, command.line)
     text = options.text("position")
     everywhere = text is None and space is not None and space.shape == "periodic"
     region = None if everywhere else region_of(text, draw)

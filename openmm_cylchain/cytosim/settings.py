@@ -15,6 +15,10 @@ IGNORED = frozenset(
 """Keys that change nothing of what is computed here: displays, files and numerical methods."""
 
 
+OFF = (None, "0", "off", "none")
+"""What a key has whose feature is off."""
+
+
 class Settings:
     """Values by keys, each a list of texts."""
 
@@ -39,12 +43,6 @@ class Settings:
         """Take values of a key."""
         self._values[key] = list(values) + self._values.get(key, [])[len(values) :]
         self._lines[key] = line
-
-    def copy(self):
-        """The same, of which nothing has been asked for yet."""
-        copy = Settings(self.label, self.line)
-        copy._values, copy._lines = dict(self._values), dict(self._lines)
-        return copy
 
     def __contains__(self, key):
         return key in self._values
@@ -84,6 +82,11 @@ class Settings:
         """Whether a number is not zero."""
         value = self.number(*places, default=None)
         return default if value is None else value != 0
+
+    def confining_space(self):
+        """The name of the space that confines it, or None for the first one."""
+        name = self.text(("confine", 2), "confine_spec")
+        return None if name in ("first", "last") else name
 
     def unused(self):
         """(key, values, line) of all that was not asked for and that is not ignored, if anything was asked for."""

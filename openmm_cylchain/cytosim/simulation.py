@@ -4,6 +4,7 @@ import math
 
 from ..errors import InputError
 from .document import EXACT, LEFT_OUT, NEAREST, Note, quantity
+from .settings import OFF
 
 _BOLTZMANN = 1.380649e-5
 """In pN um/K."""
@@ -11,7 +12,6 @@ _COLDEST = 1e-3
 _USUAL_FRAMES = 100
 _MOST_STEPS_PER_FRAME = 10**7
 _CONFINED = ("inside", "all_inside", "1")
-_FREE = (None, "off", "none", "0")
 
 
 def thermal_energy(simul):
@@ -45,14 +45,14 @@ def add_solvent(translation):
 def contact_diameter(script):
     """The distance in um at which fibers touch, or None if they do not."""
     simul = script.simul
-    if simul.text("steric") in _FREE:
+    if simul.text("steric") in OFF:
         return None
     radii = [_steric_radius(own.settings) for own in script.properties.values() if own.kind == "fiber"]
     return 2.0 * max(radii, default=0.0) or None
 
 
 def _steric_radius(settings):
-    if settings.text("steric") in _FREE:
+    if settings.text("steric") in OFF:
         return 0.0
     return max(0.0, settings.number(("steric", 1), "steric_radius", default=0.0))
 
@@ -100,7 +100,7 @@ def add_walls(translation):
         settings = fiber.settings
         mode = settings.text("confine")
         settings.values("confine_stiffness")
-        if mode in _FREE:
+        if mode in OFF:
             free.append(fiber.name)
             continue
         if mode not in _CONFINED:
@@ -108,9 +108,8 @@ def add_walls(translation):
                 f"confine = {mode} of {fiber.name}", settings.line_of("confine"), f"surfaces: confine = {mode}"
             )
             continue
-        name = settings.text(("confine", 2), "confine_spec")
         stiffness = settings.number(("confine", 1), "confine_stiffness", default=0.0)
-        found.setdefault((None if name in ("first", "last") else name, stiffness), fiber)
+        found.setdefault((settings.confining_space(), stiffness), fiber)
     if not found:
         return
     if len(found) > 1 or free:

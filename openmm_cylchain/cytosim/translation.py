@@ -11,6 +11,7 @@ from .filaments import add_filaments
 from .growth import add_monomers
 from .linkers import add_linkers
 from .nucleation import add_event
+from .places import Draw
 from .script import count_of, read_script
 from .simulation import (
     add_box,
@@ -79,6 +80,10 @@ class Translation:
         if name is None:
             return next(iter(self._spaces.values()), None)
         return self._spaces.get(name, None)
+
+    def draw_in(self, space, line):
+        """The Draw of places in a Space or none, for what stands in a line."""
+        return Draw(space, self.dimensions, self.generator, line)
 
     def shape_name(self, name=None):
         """What Cytosim calls the shape of a space."""
