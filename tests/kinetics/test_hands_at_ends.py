@@ -21,6 +21,7 @@ from openmm_cylchain import (
     Monomers,
     Severing,
 )
+from support.contexts import new_context
 
 pytest.importorskip("openmm_cylchain.plugin")
 
@@ -40,6 +41,14 @@ def states(free, held, off=(0.0, 0.0)):
     )
 
 
+def simulated(filaments, milliseconds):
+    """A Context of filaments, and its integrator with steps of so long."""
+    _, system, positions = filaments.build()
+    step = milliseconds * unit.millisecond
+    integrator = filaments.create_integrator(system, step, random_seed=3, checks=False)
+    return new_context(system, positions, integrator), integrator
+
+
 def formin(**changes):
     at_end = dict(end="plus", range=20.0, binds_there=True, tracks=True, changes=("free", "held"))
     return Hand(
@@ -50,7 +59,7 @@ def formin(**changes):
     )
 
 
-def system_with(hand, plus, concentration=5e-4):
+def filaments_with(hand, plus, concentration=5e-4):
     filaments = Filaments(viscosity=1e-3 * unit.pascal * unit.second, temperature=298.0)
     growth = Growth(
         monomers=Monomers(length=2.7), pool=MonomerPool(1e-6 * unit.molar), longest=1200.0, plus_instability=plus
@@ -61,14 +70,12 @@ def system_with(hand, plus, concentration=5e-4):
     filaments.add_linkers(
         Crosslinker(hands=[hand, other], stiffness=0.1, rest_length=10.0), concentration=concentration
     )
-    return filaments, *filaments.build()
+    return filaments
 
 
 def context_of(hand, plus, step=1.0, **options):
-    filaments, _, system, positions = system_with(hand, plus, **options)
-    integrator = filaments.create_integrator(system, step * unit.millisecond, random_seed=3, checks=False)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    filaments = filaments_with(hand, plus, **options)
+    context, integrator = simulated(filaments, step)
     return filaments.in_context(context), integrator
 
 
@@ -122,10 +129,7 @@ def test_hands_change_the_ends_to_which_they_bind_and_no_others():
     other = Hand(binding_rate=0.0, reach=10.0, unbinding_rate=0.0)
     hands = [replace(formin(), binds_to=[ACTIN.name]), other]
     filaments.add_linkers(Crosslinker(hands=hands, stiffness=0.1, rest_length=10.0), concentration=1e-9)
-    _, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, 1 * unit.millisecond, random_seed=3, checks=False)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context, integrator = simulated(filaments, 1)
     integrator.step(300)
     growth = filaments.in_context(context).growth()
     # 20 of 21 shrink in the long run, of 48.
@@ -138,10 +142,7 @@ def test_a_tether_of_a_growing_filament_moves():
     growth = Growth(monomers=monomers, pool=1e-6 * unit.molar, longest=1200.0, minus_capped=True)
     filaments.add_straight(ACTIN, 4, [0, 0, 0], [1, 0, 0], growth=growth)
     filaments.add_tether(0, 0, [0, 0, 0], 50.0)
-    _, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, 0.2 * unit.millisecond, random_seed=3, checks=False)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context, integrator = simulated(filaments, 0.2)
     integrator.step(100)
     filaments.in_context(context).move_tether(0, [0, 30.0, 0])
     integrator.step(500)
@@ -162,10 +163,7 @@ def cutting_context(rate, growth):
     ]
     severers = Crosslinker(hands=hands, stiffness=0.1, rest_length=10.0)
     filaments.add_linkers(severers, count=FILAMENTS, bound=FILAMENTS, volume=1e9)
-    _, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, 1 * unit.millisecond, random_seed=3, checks=False)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context, integrator = simulated(filaments, 1)
     return filaments.in_context(context), integrator
 
 
@@ -197,7 +195,7 @@ def test_hands_cut_filaments_where_they_are_bound():
 
 def test_a_system_keeps_what_hands_do_at_ends():
     hand = replace(formin(), severing_rate=PER_SECOND)
-    _, _, system, _ = system_with(hand, states(20.0, 4.0))
+    _, system, _ = filaments_with(hand, states(20.0, 4.0)).build()
     copy = openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(system))
     assert openmm.XmlSerializer.serialize(copy) == openmm.XmlSerializer.serialize(system)
 
@@ -210,7 +208,10 @@ def test_a_system_keeps_what_hands_do_at_ends():
         (lambda: HandAtEnd(end="plus", range=1.0, changes=("free",)), "two different states"),
         (lambda: HandAtEnd(end="plus", range=1.0, tracks=1.0), "tracks"),
         (lambda: Hand(binding_rate=1.0, reach=1.0, unbinding_rate=1.0, filament_end="plus"), "filament_end"),
-        (lambda: system_with(formin(changes=("free", "slow")), states(20.0, 4.0)), "but the states are free, held"),
+        (
+            lambda: filaments_with(formin(changes=("free", "slow")), states(20.0, 4.0)).build(),
+            "but the states are free, held",
+        ),
     ],
 )
 def test_wrong_ends_are_refused(make, message):
@@ -256,10 +257,7 @@ def test_the_first_node_of_a_capped_end_has_a_tether():
         filaments.add_tether(number, 0, [0, 0, 0], 0.5)
     with pytest.raises(InputError, match="minus_capped=True"):
         filaments.add_tether(0, 1, [0, 0, 0], 0.5)
-    _, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, 0.2 * unit.millisecond, random_seed=3, checks=False)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context, integrator = simulated(filaments, 0.2)
     first, squares = [nodes[0] for nodes in filaments.node_indices], []
     integrator.step(100)
     for _ in range(100):

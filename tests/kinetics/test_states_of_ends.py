@@ -24,6 +24,7 @@ from openmm_cylchain import (
 )
 from openmm_cylchain.kinetics.growth_force import find_growth_force
 from openmm_cylchain.runs.steady_populations import steady_population
+from support.contexts import new_context
 
 pytest.importorskip("openmm_cylchain.plugin")
 
@@ -39,11 +40,13 @@ def contexts_of(growth, count, segments, step=STEP):
     filaments = Filaments(WATER, TEMPERATURE)
     for number in range(count):
         filaments.add_straight(ACTIN, segments, [0, 0, 50.0 * number], [1, 0, 0], growth=growth)
+    return filaments, context_of(filaments, step)
+
+
+def context_of(filaments, step=STEP):
     _, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, step, random_seed=3, checks=False)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName("CPU"), {"Threads": "1"})
-    context.setPositions(positions)
-    return filaments, context
+    return new_context(system, positions, integrator, "CPU", {"Threads": "1"})
 
 
 def mean_within(samples, expected, bias):
@@ -196,14 +199,11 @@ def test_catastrophes_that_come_with_the_length():
     assert expected.length / MONOMER == pytest.approx(normal, rel=0.01)
     filaments = Filaments(WATER, TEMPERATURE)
     filaments.add_reserve(ACTIN, 250, growth=growth, nucleation=nucleation)
-    _, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, STEP, random_seed=3, checks=False)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName("CPU"), {"Threads": "1"})
-    context.setPositions(positions)
-    integrator.step(20)
+    context = context_of(filaments)
+    context.getIntegrator().step(20)
     lengths, numbers = [], []
     for _ in range(60):
-        integrator.step(8)
+        context.getIntegrator().step(8)
         state = filaments.in_context(context).growth()
         there = state.nodes > 0
         numbers.append(there.sum())
