@@ -41,7 +41,8 @@ from .filaments.attachments import Attachment
 from .filaments.end_states import DynamicInstability, EndStates, TwoUnitCap
 from .filaments.filament import Filament, Tether
 from .filaments.filament_type import FilamentType
-from .filaments.growth import Growth, MonomerPool, Monomers, MonomerState
+from .filaments.growth import Growth
+from .filaments.monomers import MonomerPool, Monomers, MonomerState
 from .filaments.presets import ACTIN_AGING, ACTIN_ATP, DSDNA, F_ACTIN, MDIA1_ENDS, MICROTUBULE, TUBULIN
 from .filaments.segment_place import SegmentPlace
 from .filaments.severing import Severing

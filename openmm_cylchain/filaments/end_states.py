@@ -104,9 +104,10 @@ class EndStates:
         count = len(self.on_rates)
         if not 1 <= count <= _MOST_STATES:
             raise InputError(f"An end has from 1 to {_MOST_STATES} states, but on_rates has {count} values.")
-        lengths = self.switch_lengths or (0.0,) * count
-        if len(self.off_rates) != count or len(lengths) != count:
-            raise InputError(f"on_rates has {count} values: off_rates and switch_lengths must have as many.")
+        lengths = tuple(self.switch_lengths) or (0.0,) * count
+        for name, values in (("off_rates", self.off_rates), ("switch_lengths", lengths)):
+            if len(values) != count:
+                raise InputError(f"on_rates has {count} values: {name} must have as many.")
         object.__setattr__(self, "on_rates", tuple(as_on_rate(rate, "on_rates") for rate in self.on_rates))
         object.__setattr__(self, "off_rates", tuple(non_negative(rate, RATE, "off_rates") for rate in self.off_rates))
         object.__setattr__(
@@ -177,7 +178,7 @@ class EndStates:
     def _share_of_rates(self, length: float) -> FloatArray:
         # By what the rates from each state are to be multiplied, of a filament of a length.
         lengths = np.array(self.switch_lengths)
-        return np.where(lengths > 0.0, length / np.where(lengths > 0.0, lengths, 1.0), 1.0)
+        return np.divide(length, lengths, out=np.ones_like(lengths), where=lengths > 0.0)
 
     def require_monomers_for_blocked(self, concentration: float, longest: float) -> None:
         """InputError if more changes are asked for where growth is blocked than monomers that could not come."""

@@ -6,7 +6,7 @@ from openmm import unit
 
 from .end_states import EndStates
 from .filament_type import FilamentType
-from .growth import Monomers, MonomerState
+from .monomers import Monomers, MonomerState
 
 _PICONEWTON = unit.piconewton
 _PER_AMOUNT = unit.liter / unit.mole / unit.second

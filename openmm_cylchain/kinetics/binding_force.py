@@ -164,9 +164,7 @@ def _set_hand_at_end(force, number, hand, growths, name):
         free, held = own.find_changes(different.values())
     except InputError as error:
         raise InputError(f"Linkers {name!r}: {error}") from None
-    changed = []
-    if own.changes is not None:
-        changed = [i for i, growth in growths.items() if growth is not None and own.may_change(growth)]
+    changed = [i for i, growth in growths.items() if growth is not None and own.may_change(growth)]
     force.setHandAtEnd(number, int(own.end == "plus"), own.range, own.binds_there, own.tracks, free, held, changed)
 
 

@@ -88,16 +88,13 @@ class HandAtEnd:
             raise InputError("a hand has to do with ends, but binds to no filaments that grow.")
         if self.changes is None:
             return -1, -1
-        what = f"a hand changes {self.end} ends from {self.changes[0]!r} to {self.changes[1]!r}"
-        states = [growth.states(self.end).names for growth in growths]
-        found = {
-            (names.index(self.changes[0]), names.index(self.changes[1]))
-            for names in states
-            if set(self.changes) <= set(names)
-        }
-        known = " or ".join(dict.fromkeys(", ".join(names) for names in states))
-        if not found:
+        able = [growth.states(self.end) for growth in growths if self.may_change(growth)]
+        found = {tuple(map(states.find, self.changes)) for states in able}
+        if len(found) != 1:
+            what = f"a hand changes {self.end} ends from {self.changes[0]!r} to {self.changes[1]!r}"
+            known = " or ".join(dict.fromkeys(", ".join(growth.states(self.end).names) for growth in growths))
+            if found:
+                raise InputError(f"{what}, which have different numbers among their states {known}.")
             raise InputError(f"{what}, but the states are {known}.")
-        if len(found) > 1:
-            raise InputError(f"{what}, which have different numbers among their states {known}.")
-        return found.pop()
+        ((free, held),) = found
+        return free, held

@@ -167,11 +167,11 @@ def _shares_of_states(table, growth, numbers, end):
         return
     names, there = table.column(f"{end} end state", numbers)[late], table.there(numbers)[late]
     concentration = float(table.column("free monomers (uM)", numbers)[late].mean()) * MICROMOLAR
-    known = not (growth.monomers.aging or growth.vanishes or any(states.switch_lengths))
-    free = states.shares(concentration).tolist() if known else [None] * len(states.names)
+    known = not (growth.monomers.aging or growth.vanishes)
+    free = states.shares(concentration).tolist() if known else [np.nan] * len(states.names)
     for name, of_free_ends in zip(states.names, free):
         share = _ratio(np.sum((names == name) & there, axis=1, dtype=float), there.sum(axis=1, dtype=float))
-        yield StateShare(name, *map(_finite, share), of_free_ends)
+        yield StateShare(name, *map(_finite, (*share, of_free_ends)))
 
 
 def rate_of_gains(table, end, numbers=None, late=slice(None), sizes=1.0):

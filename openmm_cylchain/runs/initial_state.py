@@ -17,7 +17,7 @@ from ..couplings.pulling import constant_force, constant_tension
 from ..couplings.walls import filament_wall_force, wall_force
 from ..errors import InputError
 from ..filaments import shapes
-from ..filaments.growth import Monomers
+from ..filaments.monomers import Monomers
 from ..filaments.segment_place import SegmentPlace
 from ..output.progress import LateMessages, ProgressMessages
 from ..systems.filaments import Filaments

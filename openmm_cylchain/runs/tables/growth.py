@@ -2,8 +2,9 @@
 
 from ...engine_choice import choose_engine
 from ...filaments.end_states import ENDS, DynamicInstability, EndStates, TwoUnitCap
-from ...filaments.growth import Growth, Severing
+from ...filaments.growth import Growth
 from ...filaments.presets import MDIA1_ENDS
+from ...filaments.severing import Severing
 from ...time_steps.schemes import IMPLICIT_SCHEMES
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Either, Flag, Inline, Key, Listing, Named, Quantity, Text, close_match

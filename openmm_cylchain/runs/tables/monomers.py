@@ -3,7 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 
-from ...filaments.growth import MonomerPool, Monomers, MonomerState
+from ...filaments.monomers import MonomerPool, Monomers, MonomerState
 from ...filaments.presets import ACTIN_AGING, ACTIN_ATP, TUBULIN
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Inline, Key, Listing, Quantity, Text, WordOrQuantity
