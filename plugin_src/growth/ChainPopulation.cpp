@@ -259,7 +259,7 @@ int ChainPopulation::sever(GrowthState& state, const GrowthStep& step, const Gro
             return -1;
     }
     const MonomerRange ranges[] = {{before.first, monomer}, {monomer, before.last}};
-    bool stays[2];
+    bool stays[2] = {};
     for (int side : {0, 1}) {
         stays[side] = ranges[side].size() >= own.leastMonomers;
         if (!stays[side] && !own.vanishes)
