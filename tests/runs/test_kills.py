@@ -1,4 +1,4 @@
-"""A network with motors and crosslinkers that is killed at random moments, again and again, ends with the same files.
+"""Networks that are killed at random moments, again and again, end with the same files.
 
 ``OPENMM_CYLCHAIN_TEST_KILLS=100`` before the command of pytest kills it so often.
 """
@@ -15,20 +15,28 @@ import pytest
 from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.run import run
 from support import small_runs
+from support.configurations import COMING_AND_GOING
 
 # Many checkpoints, so that kills fall into writing them, too.
 NETWORK = small_runs.NETWORK.replace(
     'duration = "1 ms"\nreport_interval = "0.1 ms"',
     'duration = "8 ms"\nreport_interval = "50 us"\ncheckpoint_interval = "50 us"',
 )
-STEPS = 1600
+GROWING = COMING_AND_GOING.replace(
+    'report_interval = "5 ms"\ncheckpoint_interval = "15 ms"',
+    'report_interval = "0.5 ms"\ncheckpoint_interval = "1 ms"',
+)
 FILES = ("trajectory.dcd", "energies.csv", "linkers.csv", "linkers.npy", "description.json", "topology.cif")
+OF_GROWING = ("growth.csv", "wall_forces.csv", "contact_forces.csv", "checkpoint.chk")
 KILLS = int(os.environ.get("OPENMM_CYLCHAIN_TEST_KILLS", "3"))
 
 
 def contents(directory, name):
     # The header of a DCD file has the date of its beginning, behind the number of frames.
+    # So does the first line of a checkpoint.
     content = (directory / name).read_bytes()
+    if name == "checkpoint.chk":
+        return content.partition(b"\n")[2]
     return content[:92] + content[276:] if name == "trajectory.dcd" else content
 
 
@@ -53,9 +61,15 @@ def started(processes, configuration, output):
 
 
 @pytest.mark.slow
-def test_network_that_is_killed_at_random_moments(tmp_path, processes):
+@pytest.mark.parametrize(
+    ("text", "steps", "files"),
+    [(NETWORK, 1600, FILES), (GROWING, 1000, FILES + OF_GROWING)],
+    ids=["linked", "growing"],
+)
+def test_network_that_is_killed_at_random_moments(text, steps, files, tmp_path, processes):
     """Counted are kills of what has written a checkpoint and is not at its last step; others come on top."""
-    configuration = parse_configuration(NETWORK)
+    configuration = parse_configuration(text)
+    assert configuration.simulation.steps == steps
     reference = tmp_path / "reference"
     started(processes, configuration, tmp_path / "first").join()  # It starts the server, which takes long.
     begun = time.monotonic()
@@ -82,11 +96,11 @@ def test_network_that_is_killed_at_random_moments(tmp_path, processes):
                 longest *= 0.9  # So that about as many kills come too late as too early, however busy the machine is.
             else:
                 step = step_of_checkpoint(output)
-                if step not in (before, STEPS):
+                if step not in (before, steps):
                     counted.append(step)
                 else:
                     others += 1
                     longest *= 1.1
-        for name in FILES:
+        for name in files:
             assert contents(output, name) == contents(reference, name) != b"", (name, counted)
     print(f"{len(counted)} kills of {runs} runs of {longest:.2f} s, and {others} before a checkpoint or behind the end")
