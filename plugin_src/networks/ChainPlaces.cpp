@@ -6,9 +6,21 @@
 using namespace cylchain;
 using namespace std;
 
-ChainPlaces::ChainPlaces(const vector<Chain>& chains, const vector<BeamChain>& beams, int particles) : chains(chains),
-        beams(beams), chainOfParticle(particles, -1), nodeOfParticle(particles, -1),
-        packOfChain(chains.size()+beams.size(), -1), laneOfChain(chains.size()+beams.size(), -1) {
+/** The friction of a place against motion of its own, at the most: as the body turns about its easiest axis. */
+static double frictionOfBody(const RigidBody& body, int place) {
+    const double* const arm = &body.places[3*place];
+    const double* const z = body.rotationalFriction;
+    const double square = arm[0]*arm[0]+arm[1]*arm[1]+arm[2]*arm[2];
+    // No less than the determinant over the largest product of the other two eigenvalues.
+    const double determinant = z[0]*(z[3]*z[5]-z[4]*z[4])-z[1]*(z[1]*z[5]-z[4]*z[2])+z[2]*(z[1]*z[4]-z[3]*z[2]);
+    const double trace = z[0]+z[3]+z[5];
+    const double least = 4*determinant/(trace*trace);
+    return 1/(1/body.friction+square/least);
+}
+
+ChainPlaces::ChainPlaces(const vector<Chain>& chains, const vector<BeamChain>& beams, const vector<RigidBody>& bodies,
+        int particles) : chains(chains), beams(beams), bodies(bodies), chainOfParticle(particles, -1),
+        nodeOfParticle(particles, -1), packOfChain(getNumChains(), -1), laneOfChain(getNumChains(), -1) {
     firstNodes.push_back(0);
     for (const Chain& chain : chains) {
         const int number = closed.size();
@@ -24,6 +36,11 @@ ChainPlaces::ChainPlaces(const vector<Chain>& chains, const vector<BeamChain>& b
         for (size_t i = 0; i < beams[beam].particles.size(); i++) {
             chainOfParticle[beams[beam].particles[i]] = chains.size()+beam;
             nodeOfParticle[beams[beam].particles[i]] = i%2 == 0 ? i/2 : -1;
+        }
+    for (size_t body = 0; body < bodies.size(); body++)
+        for (size_t i = 0; i < bodies[body].particles.size(); i++) {
+            chainOfParticle[bodies[body].particles[i]] = getNumFilaments()+body;
+            nodeOfParticle[bodies[body].particles[i]] = i;
         }
     updateLengths();
 }
@@ -50,7 +67,8 @@ void ChainPlaces::findLeastFriction() {
     for (int chain = 0; chain < getNumChains(); chain++) {
         PlaceOnChain place;
         place.chain = chain;
-        const int segments = isStraight(chain) ? chains[chain].segments.size() : 1;
+        const int segments = isStraight(chain) ? chains[chain].segments.size() :
+                isBody(chain) ? bodyOf(chain).particles.size() : 1;
         for (place.node = 0; place.node < segments; place.node++)
             leastFriction = min(leastFriction, getFriction(place));
         place.hold.tangent = 1;
@@ -64,7 +82,7 @@ void ChainPlaces::setParticles(const vector<CoupledParticle>& newParticles) {
         chainOfParticle[own.particle] = -1;
     particles = newParticles;
     for (size_t i = 0; i < particles.size(); i++)
-        chainOfParticle[particles[i].particle] = getNumFilaments()+i;
+        chainOfParticle[particles[i].particle] = getFirstParticle()+i;
     findLeastFriction();
     packOfChain.resize(getNumChains(), -1);
     laneOfChain.resize(getNumChains(), -1);
@@ -91,7 +109,8 @@ bool ChainPlaces::find(const Place& place, PlaceOnChain& result) const {
     result.pack = packOfChain[chain];
     result.lane = laneOfChain[chain];
     result.chain = chain;
-    if (isParticle(chain)) {
+    if (isParticle(chain) || isBody(chain)) {
+        result.node = isBody(chain) ? nodeOfParticle[place.first] : 0;
         if (place.isOnSegment())
             result = PlaceOnChain();
         return !place.isOnSegment();
@@ -138,6 +157,8 @@ double ChainPlaces::getFriction(const PlaceOnChain& place) const {
         return frictionOfNode[firstNodes[place.chain]+place.node];
     if (isParticle(place.chain))
         return particleOf(place.chain).friction;
+    if (isBody(place.chain))
+        return frictionOfBody(bodyOf(place.chain), place.node);
     const BeamChain& beam = getBeam(place.chain);
     const double friction = beam.elementLength*min(beam.parallelFriction, beam.perpendicularFriction);
     if (place.hold.tangent != 0)
@@ -150,12 +171,16 @@ int ChainPlaces::getParticle(const PlaceOnChain& place) const {
         return particleOfNode[firstNodes[place.chain]+place.node];
     if (isParticle(place.chain))
         return particleOf(place.chain).particle;
+    if (isBody(place.chain))
+        return bodyOf(place.chain).particles[0];
     return getBeam(place.chain).particles[2*place.node];
 }
 
 LateralFriction ChainPlaces::findLateralFriction(const PlaceOnChain& place) const {
     if (isParticle(place.chain))
         return {particleOf(place.chain).friction, 0, 0, 0};
+    if (isBody(place.chain))
+        return {frictionOfBody(bodyOf(place.chain), place.node), 0, 0, 0};
     if (isBeam(place.chain)) {
         // An element is moved as four Legendre polynomials of the place, of which the second turns it.
         const BeamChain& beam = getBeam(place.chain);
@@ -170,6 +195,8 @@ LateralFriction ChainPlaces::findLateralFriction(const PlaceOnChain& place) cons
 vector<int> ChainPlaces::getNodes(int chain) const {
     if (isParticle(chain))
         return {particleOf(chain).particle};
+    if (isBody(chain))
+        return bodyOf(chain).particles;
     if (isBeam(chain))
         return getBeam(chain).particles;
     return chains[chain].nodes;

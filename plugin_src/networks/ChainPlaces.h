@@ -5,6 +5,7 @@
 #include "mechanics/BeamChain.h"
 #include "mechanics/Chain.h"
 #include "mechanics/ElementHold.h"
+#include "mechanics/RigidBody.h"
 #include "networks/ParticleStep.h"
 #include <vector>
 
@@ -14,9 +15,12 @@ namespace cylchain {
 struct PlaceOnChain {
     /** The number of the pack among those of the step, or -1 for a place that does not move. */
     int pack = -1;
-    /** The segment or element is the one between this node and the next. */
+    /** The segment or element is the one between this node and the next; of a body, the particle has this number. */
     int node = 0, lane = 0;
-    /** The chain; of beam elements, its number behind those of segments; for a particle, behind those of all chains. */
+    /**
+     * The chain; of beam elements, its number behind those of segments; for a rigid body, behind those of all chains,
+     * and for a particle, behind those of bodies.
+     */
     int chain = -1;
     /** Of the segment or element, and what is held of an element there. */
     double fraction = 0;
@@ -37,17 +41,19 @@ struct LateralFriction {
 
 /**
  * Finds places on chains, and at particles outside chains that are coupled to them. Chains of beam elements count as
- * further chains, and these particles as further ones behind them.
+ * further chains, rigid bodies as further ones behind them, and then these particles.
  */
 class ChainPlaces {
 public:
     /**
      * @param chains     they must exist as long as this object
      * @param beams      so must they
+     * @param bodies     and they
      * @param particles  the number of particles of the System
      */
-    ChainPlaces(const std::vector<Chain>& chains, const std::vector<BeamChain>& beams, int particles);
-    /** Set the particles outside chains. */
+    ChainPlaces(const std::vector<Chain>& chains, const std::vector<BeamChain>& beams,
+            const std::vector<RigidBody>& bodies, int particles);
+    /** Set the particles outside chains and bodies. */
     void setParticles(const std::vector<CoupledParticle>& particles);
     /**
      * Take note of the packs of a step.
@@ -62,7 +68,7 @@ public:
      *         segment, or at the control point of a beam element
      */
     bool find(const Place& place, PlaceOnChain& result) const;
-    /** The particle at a place, or at the beginning of its segment. */
+    /** The particle at a place, or at the beginning of its segment; of a body, its first one. */
     int getParticle(const PlaceOnChain& place) const;
     int getNumParticles() const {
         return chainOfParticle.size();
@@ -86,13 +92,17 @@ public:
     const std::vector<Chain>& getChains() const {
         return chains;
     }
-    /** The number of chains, those of beam elements among them, behind which particles are counted. */
+    /** The number of chains, those of beam elements among them, behind which bodies are counted. */
     int getNumFilaments() const {
         return chains.size()+beams.size();
     }
+    /** The number of chains and bodies, behind which particles are counted. */
+    int getFirstParticle() const {
+        return getNumFilaments()+bodies.size();
+    }
     /** Whether a chain is one of beam elements. */
     bool isBeam(int chain) const {
-        return !isStraight(chain) && !isParticle(chain);
+        return !isStraight(chain) && chain < getNumFilaments();
     }
     /** A chain of beam elements, by its number among all chains. */
     const BeamChain& getBeam(int chain) const {
@@ -102,20 +112,26 @@ public:
     double getLength(int chain) const {
         return lengths[chain];
     }
-    /** The number of chains and particles. */
+    /** The number of chains, bodies and particles. */
     int getNumChains() const {
-        return getNumFilaments()+particles.size();
+        return getFirstParticle()+particles.size();
     }
     /** Take note that segments have other lengths and friction, while nodes are the same. */
     void updateLengths();
-    /** The particles that move with a chain, or the one that is counted as one. */
+    /** The particles that move with a chain or body, or the one that is counted as one. */
     std::vector<int> getNodes(int chain) const;
 private:
     bool isParticle(int chain) const {
-        return chain >= getNumFilaments();
+        return chain >= getFirstParticle();
     }
     const CoupledParticle& particleOf(int chain) const {
-        return particles[chain-getNumFilaments()];
+        return particles[chain-getFirstParticle()];
+    }
+    bool isBody(int chain) const {
+        return chain >= getNumFilaments() && chain < getFirstParticle();
+    }
+    const RigidBody& bodyOf(int chain) const {
+        return bodies[chain-getNumFilaments()];
     }
     bool isStraight(int chain) const {
         return chain < (int) chains.size();
@@ -128,6 +144,7 @@ private:
     }
     const std::vector<Chain>& chains;
     const std::vector<BeamChain>& beams;
+    const std::vector<RigidBody>& bodies;
     std::vector<CoupledParticle> particles;
     std::vector<double> lengths;
     /**

@@ -1,4 +1,5 @@
 #include "networks/NetworkStep.h"
+#include "networks/BodyStep.h"
 #include <algorithm>
 #include <cstddef>
 #include <numeric>
@@ -35,8 +36,8 @@ struct NetworkStep::Attempt {
 };
 
 NetworkStep::NetworkStep(const ChainEngine& engine, const vector<Chain>& chains, const PackStepSource& beamEngine,
-        const vector<BeamChain>& beams, int particles) : engine(engine), beamEngine(beamEngine),
-        places(chains, beams, particles), moved(3*(size_t) particles) {
+        const vector<BeamChain>& beams, const vector<RigidBody>& bodies, int particles) : engine(engine),
+        beamEngine(beamEngine), bodies(bodies), places(chains, beams, bodies, particles), moved(3*(size_t) particles) {
 }
 
 NetworkStep::~NetworkStep() {
@@ -81,13 +82,16 @@ void NetworkStep::choosePacks(const StepSettings& settings) {
         for (int& chain : chainsOfLanes.back())
             chain += places.getChains().size();
     }
-    if (!particles.empty()) {
-        // They are numbered behind the chains.
-        vector<int> numbers(particles.size());
-        iota(numbers.begin(), numbers.end(), places.getNumFilaments());
-        steps.emplace_back(new ParticleStep(particles));
-        chainsOfLanes.push_back(numbers);
-    }
+    // Bodies are numbered behind the chains, and particles behind these.
+    auto addStep = [&] (PackStep* step, size_t count, int firstNumber) {
+        steps.emplace_back(step);
+        chainsOfLanes.emplace_back(count);
+        iota(chainsOfLanes.back().begin(), chainsOfLanes.back().end(), firstNumber);
+    };
+    if (!bodies.empty())
+        addStep(new BodyStep(bodies), bodies.size(), places.getNumFilaments());
+    if (!particles.empty())
+        addStep(new ParticleStep(particles), particles.size(), places.getFirstParticle());
     stepsOfPacks.clear();
     unfinished.clear();
     flags.clear();

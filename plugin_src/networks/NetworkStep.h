@@ -26,10 +26,11 @@ public:
      * @param chains      they must exist as long as this object, and so must the engine
      * @param beamEngine  the engine of chains of beam elements
      * @param beams       these chains, which must exist as long
+     * @param bodies      the rigid bodies, which must exist as long
      * @param particles   the number of particles of the System
      */
     NetworkStep(const ChainEngine& engine, const std::vector<Chain>& chains, const PackStepSource& beamEngine,
-            const std::vector<BeamChain>& beams, int particles);
+            const std::vector<BeamChain>& beams, const std::vector<RigidBody>& bodies, int particles);
     ~NetworkStep();
     /** Take note that segments have other lengths and friction, while nodes are the same. */
     void updateLengths() {
@@ -40,7 +41,7 @@ public:
     /**
      * Compute the displacements of all nodes and of the coupled particles in a step, as ChainEngine::step() does. Of
      * the result, the chain by which the step has gone wrong may be one of beam elements, with a number behind those of
-     * segments, or a particle, behind those of all chains.
+     * segments, or a rigid body, behind those of all chains, or a particle, behind those of bodies.
      */
     Instability step(const double* positions, const double* forces, const double* box, const StepSettings& settings,
             double* displacements, const Loop& loop);
@@ -66,6 +67,7 @@ private:
     int stepApart(const Attempt& attempt, const std::vector<bool>& apart);
     const ChainEngine& engine;
     const PackStepSource& beamEngine;
+    const std::vector<RigidBody>& bodies;
     ChainPlaces places;
     /** Those of all forces, and what an attempt has in their place. */
     std::vector<ImplicitCouplings*> ofForces, couplings;

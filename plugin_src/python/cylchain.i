@@ -208,12 +208,15 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         std::vector<int>& types, std::vector<int>& anchors, std::vector<int>& chains};
 %apply const std::vector<int>& numbers {const std::vector<int>& ends, const std::vector<int>& models,
         const std::vector<int>& active, const std::vector<int>& types, const std::vector<int>& anchors,
-        const std::vector<int>& chains};
+        const std::vector<int>& chains, const std::vector<int>& particles};
+%apply std::vector<int>& numbers {std::vector<int>& particles};
 %apply std::vector<double>& tensions {std::vector<double>& fractions, std::vector<double>& points,
         std::vector<double>& parameters, std::vector<double>& places, std::vector<double>& gaps,
-        std::vector<double>& forces, std::vector<double>& sums, std::vector<double>& loads};
+        std::vector<double>& forces, std::vector<double>& sums, std::vector<double>& loads,
+        std::vector<double>& rotationalFriction};
 %apply const std::vector<double>& fractions {const std::vector<double>& points,
-        const std::vector<double>& parameters, const std::vector<double>& places, const std::vector<double>& loads};
+        const std::vector<double>& parameters, const std::vector<double>& places, const std::vector<double>& loads,
+        const std::vector<double>& rotationalFriction};
 
 %typemap(in, numinputs=0) std::vector<Vec3>& vectors (std::vector<OpenMM::Vec3> value) {
     $1 = &value;
@@ -235,9 +238,9 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         double& strainShare, double& unbindingForce, double& catchRate, double& catchForce, double& speed,
         double& stallForce, double& volume, double& concentration, double& elementLength, double& stretchingModulus,
         double& bendingRigidity, double& shortening, double& rate, double& angle,
-        double& distance, double& beyond, double& range};
+        double& distance, double& beyond, double& range, double& friction};
 %apply bool& OUTPUT {bool& walksBackward, bool& holdsAtEnds, bool& sameChain, bool& vanishes, bool& isRegular,
-        bool& bindsThere, bool& tracks};
+        bool& bindsThere, bool& tracks, bool& planar};
 %apply long long& OUTPUT {long long& bindings, long long& unbindings};
 
 %pythoncode %{
@@ -365,6 +368,11 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %pythonappend OpenMM::CylinderChainIntegrator::getFriction() const %{
     val = unit.Quantity(val, 1/unit.picosecond)
 %}
+%pythonappend OpenMM::CylinderChainIntegrator::getBody(int, std::vector<int>&, std::vector<double>&, double&,
+        std::vector<double>&, bool&) const %{
+    units = (unit.dimensionless, _LENGTH, _FRICTION, _FRICTION*_LENGTH**2, unit.dimensionless)
+    val = [v if u == unit.dimensionless else unit.Quantity(v, u) for v, u in zip(val, units)]
+%}
 %pythonappend OpenMM::CylinderChainIntegrator::getFlow(Vec3&, Vec3&, Vec3&, Vec3&, Vec3&) const %{
     units = (_VELOCITY, 1/unit.picosecond, 1/unit.picosecond, 1/unit.picosecond, _LENGTH)
     val = [unit.Quantity(v, u) for v, u in zip(val, units)]
@@ -445,6 +453,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %ignore OpenMM::CylinderChainForce::getChains;
 %ignore OpenMM::CylinderChainForce::describeChains;
 %ignore OpenMM::CylinderChainContactForce::getBodies;
+%ignore OpenMM::CylinderChainIntegrator::getBodies;
 %ignore OpenMM::CylinderChainWallForce::getWalls;
 %ignore OpenMM::CylinderChainBindingForce::getState;
 %ignore OpenMM::CylinderChainBindingForce::getHand;

@@ -47,8 +47,8 @@ static Vec3d vectorAt(const Array& x, int particle) {
 class Particles {
 public:
     Particles(const Surroundings& surroundings, const vector<Vec3d>& starts, double kT = 1) :
-            surroundings(surroundings), places(noChains, noBeams, starts.size()), pack(coupledParticles(starts.size())),
-            x(3*starts.size()) {
+            surroundings(surroundings), places(noChains, noBeams, noBodies, starts.size()),
+            pack(coupledParticles(starts.size())), x(3*starts.size()) {
         places.setParticles(coupledParticles(starts.size()));
         vector<int> lanes(starts.size());
         iota(lanes.begin(), lanes.end(), 0);
@@ -154,6 +154,7 @@ private:
     const Surroundings surroundings;
     const vector<Chain> noChains;
     const vector<BeamChain> noBeams;
+    const vector<RigidBody> noBodies;
     ChainPlaces places;
     ParticleStep pack;
     CoupledEquations coupled;

@@ -30,7 +30,7 @@ void ChainCouplings::update() {
         own.taken = resolver.whyExplicit(places).empty();
         own.particles.clear();
         for (const Place& place : places)
-            if (resolver.movesAlone(place))
+            if (resolver.movesAlone(place) && !others.isOfBody(place.first))
                 own.particles.push_back(place.first);
         own.version = own.force->getVersion();
     }

@@ -17,6 +17,9 @@ static double norm(const Vec3& v) {
     return sqrt(v.dot(v));
 }
 
+/** How far particles of a rigid body may be from where they belong, as positions are set: rounded, as in a file. */
+static const double LARGEST_DEFORMATION = 0.01;
+
 static Kernel createKernel(ContextImpl& context, CylinderChainForceImpl& force, const OtherParticles& others) {
     Kernel kernel = context.getPlatform().createKernel(IntegrateCylinderChainStepKernel::Name(), context);
     kernel.getAs<IntegrateCylinderChainStepKernel>().initialize(context.getSystem(), force.getDescription(),
@@ -32,6 +35,8 @@ static vector<int> findMobileParticles(const ChainList& chains, const OtherParti
                 if (!chain.fixed[i])
                     mobile.push_back(chain.getParticles()[i]);
         });
+    for (const RigidBody& body : others.getBodies())
+        mobile.insert(mobile.end(), body.particles.begin(), body.particles.end());
     sort(mobile.begin(), mobile.end());
     return mobile;
 }
@@ -116,6 +121,9 @@ StepSettings CylinderChainStepper::describeStep(uint64_t seed, int level, uint64
         chains.requireModes();
     settings.kT = BOLTZ*integrator.getTemperature();
     refuseBeams(settings.scheme, settings.kT);
+    if (!others.getBodies().empty() && settings.scheme != Scheme::Implicit)
+        throw OpenMMException("CylinderChainIntegrator: Rigid bodies are for scheme Implicit alone, with the force group "
+                "of the CylinderChainForce among the integration force groups");
     settings.stepSize = integrator.getStepSize();
     settings.seed = seed;
     settings.level = level;
@@ -188,6 +196,24 @@ void CylinderChainStepper::refuseTornChains() const {
         });
 }
 
+void CylinderChainStepper::refuseDeformedBodies() const {
+    if (others.getBodies().empty())
+        return;
+    const vector<Vec3> positions = getPositions();
+    for (size_t i = 0; i < others.getBodies().size(); i++) {
+        const RigidBody& body = others.getBodies()[i];
+        const double deformation = findDeformation(body, RigidFrameFinder(body).find(body, &positions[0][0]),
+                &positions[0][0]);
+        if (deformation < LARGEST_DEFORMATION*body.findRadius())
+            continue;
+        stringstream message;
+        message << "Body " << i << " is deformed: a particle of it is " << deformation << " nm from where it belongs. "
+                "Set positions of all its particles as they are moved and turned together, not wrapped into a "
+                "periodic box one by one";
+        throw OpenMMException(message.str());
+    }
+}
+
 /** Whether a segment can have a length. NaN counts as such, because it has reasons of its own. */
 static bool isInRange(const Segment& segment, double length) {
     return !(fabs(length-segment.restLength) >= segment.maximumExtension);
@@ -253,12 +279,12 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
     const CoupledForces& coupled = couplings.describe(getCoupledGroups(), integrator.getFriction());
     if (settings.scheme == Scheme::ImplicitSecondOrder)
         couplings.refuseTwoStages(getCoupledGroups());
-    const Instability found = coupled.empty() ? getKernel().displaceChains(context, settings) :
+    const Instability found = coupled.empty() && others.getBodies().empty() ? getKernel().displaceChains(context, settings) :
             getKernel().displaceCoupledChains(context, settings, coupled);
     if (found.chain != -1 && found.coupling.force != -1 && areForcesFinite())
         reportCoupling(found.coupling, coupled, settings);
     if (found.chain >= chains.getList().size())
-        reportParticle(coupled.particles[found.chain-chains.getList().size()].particle, settings);
+        reportParticle(particleOf(found.chain, coupled), settings);
     if (found.chain != -1)
         reportInstability(chains.getList().getNumberOfStep(found.chain), settings);
     divided += found.divided;
@@ -281,7 +307,7 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
 
 int CylinderChainStepper::stepTogether(uint64_t seed, int level, uint64_t step, int count, bool records,
         long long& divided) {
-    if (!others.getMobile().empty())
+    if (!others.getMobile().empty() || !others.getBodies().empty())
         return 0;
     explicitWork.interrupt();
     StepSettings settings = describeStep(seed, level, step);
@@ -389,12 +415,18 @@ bool CylinderChainStepper::areForcesFinite() {
     return all_of(forces.begin(), forces.end(), [] (const Vec3& force) {return isfinite(norm(force));});
 }
 
+/** The particle, or the first one of the rigid body, that is counted behind chains. */
+int CylinderChainStepper::particleOf(int number, const CoupledForces& coupled) const {
+    const int behind = number-chains.getList().size(), numBodies = others.getBodies().size();
+    return behind < numBodies ? others.getBodies()[behind].particles[0] : coupled.particles[behind-numBodies].particle;
+}
+
 void CylinderChainStepper::reportCoupling(const BrokenCoupling& coupling, const CoupledForces& coupled,
         const StepSettings& settings) {
     const ChainList& list = chains.getList();
     auto isPart = [&] (const BrokenCoupling::Place& place) {return place.chain >= 0 && place.chain < list.size();};
     auto particleOf = [&] (const BrokenCoupling::Place& place) {
-        return place.chain < list.size() ? -1 : coupled.particles[place.chain-list.size()].particle;
+        return place.chain < list.size() ? -1 : particleOf(place.chain, coupled);
     };
     auto describe = [&] (const BrokenCoupling::Place& place) {
         if (!isPart(place)) {

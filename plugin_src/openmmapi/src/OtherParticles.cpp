@@ -13,13 +13,18 @@ OtherParticles::OtherParticles(const System& system, const CylinderChainIntegrat
     for (const cylchain::Chain& chain : chains.getChains())
         for (int particle : chain.spareNodes)
             isNode[particle] = true;
+    bodies = integrator.getBodies();
+    ofBody.assign(numParticles, false);
+    for (const cylchain::RigidBody& body : bodies)
+        for (int particle : body.particles)
+            ofBody[particle] = true;
     masses.resize(numParticles);
     for (int i = 0; i < numParticles; i++) {
         masses[i] = system.getParticleMass(i);
         if (isNode[i])
             continue;
         particles.push_back(i);
-        if (masses[i] != 0.0)
+        if (masses[i] != 0.0 && !ofBody[i])
             mobile.push_back(i);
     }
     frictions.assign(numParticles, 0.0);

@@ -28,6 +28,9 @@ void CommonIntegrateCylinderChainStepKernel::initialize(const System& system, co
 
     chainKernel = &dynamic_cast<CommonCalcCylinderChainForceKernel&>(forceKernel);
     this->others = &others;
+    if (!others.getBodies().empty())
+        throw OpenMMException("On the "+getPlatform().getName()+" platform, there are no rigid bodies. Use the CPU "
+                "platform");
     cc.initializeContexts();
     if (cc.getNumContexts() > 1)
         throw OpenMMException("Filaments are computed on one device: give one DeviceIndex alone");

@@ -88,7 +88,7 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceCoupledChains(Con
     const BeamEngine& beams = chainKernel->getBeamEngine();
     if (!network || versionOfNetwork != chainKernel->getEngineVersion()) {
         network.reset(new NetworkStep(engine, chainKernel->getChains(), beams, chainKernel->getBeams(),
-                context.getSystem().getNumParticles()));
+                others->getBodies(), context.getSystem().getNumParticles()));
         versionOfNetwork = chainKernel->getEngineVersion();
     }
     else if (versionOfLengths != chainKernel->getVersionOfLengths())
@@ -108,6 +108,9 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceCoupledChains(Con
             findNewPosition(context, particle, settings.stepSize);
     for (int pack = 0; pack < beams.getNumPacks(); pack++)
         for (int particle : beams.getParticles(pack))
+            findNewPosition(context, particle, settings.stepSize);
+    for (const RigidBody& body : others->getBodies())
+        for (int particle : body.particles)
             findNewPosition(context, particle, settings.stepSize);
     mixedChains = engine.getNumMixedChains(packs);
     return result;

@@ -42,6 +42,10 @@ public:
      */
     void refuseTornChains() const;
     /**
+     * Throw an exception if positions of particles of a rigid body are not those of one.
+     */
+    void refuseDeformedBodies() const;
+    /**
      * Throw an exception if a segment has a length at which its energy is infinite.
      */
     void refuseInfiniteEnergies() const;
@@ -66,7 +70,7 @@ public:
      * @param records  whether to record tensions in the last of them, see getMeanTensions()
      * @param divided  increased by the number of steps of a chain that were taken in parts
      * @return the number of steps that were taken: fewer than count if the one after them would blow up, or 0 if there
-     *         are particles outside chains that can move
+     *         are particles outside chains that can move, or rigid bodies
      */
     int stepTogether(std::uint64_t seed, int level, std::uint64_t step, int count, bool records, long long& divided);
     /**
@@ -89,6 +93,7 @@ private:
     void recordForces(cylchain::StepSettings& settings, bool records);
     void takeNoteOfForces(const cylchain::StepSettings& settings, bool followsOn);
     void refuseBeams(cylchain::Scheme scheme, double kT) const;
+    int particleOf(int number, const cylchain::CoupledForces& coupled) const;
     bool areForcesFinite();
     void reportInstability(int chain, const cylchain::StepSettings& settings);
     void reportCoupling(const cylchain::BrokenCoupling& coupling, const cylchain::CoupledForces& coupled,

@@ -1,6 +1,7 @@
 #ifndef OPENMM_OTHERPARTICLES_H_
 #define OPENMM_OTHERPARTICLES_H_
 
+#include "mechanics/RigidBody.h"
 #include "openmm/CylinderChainIntegrator.h"
 #include "openmm/System.h"
 #include "openmm/internal/CylinderChainDescription.h"
@@ -9,7 +10,7 @@
 namespace OpenMM {
 
 /**
- * The particles outside chains.
+ * The particles outside chains, and rigid bodies of them.
  */
 class OtherParticles {
 public:
@@ -22,10 +23,22 @@ public:
         return particles;
     }
     /**
-     * Get those that can move.
+     * Get those that can move by themselves.
      */
     const std::vector<int>& getMobile() const {
         return mobile;
+    }
+    /**
+     * Get the rigid bodies.
+     */
+    const std::vector<cylchain::RigidBody>& getBodies() const {
+        return bodies;
+    }
+    /**
+     * Whether a particle is one of a rigid body.
+     */
+    bool isOfBody(int particle) const {
+        return ofBody[particle];
     }
     /**
      * Get the mobility of a particle.
@@ -38,6 +51,8 @@ public:
     }
 private:
     std::vector<int> particles, mobile;
+    std::vector<cylchain::RigidBody> bodies;
+    std::vector<bool> ofBody;
     // Of all particles of the System.  Those that have no friction coefficient of their own are marked by zero.
 
     std::vector<double> masses, frictions;

@@ -1,0 +1,519 @@
+#include "networks/BodyStep.h"
+#include "lanes/Noise.h"
+#include "mechanics/SymmetricMatrices.h"
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+using namespace cylchain;
+using namespace std;
+
+namespace {
+
+/** A change that is left out may do this much work, in k_B T. */
+const double LEAST_WORK = 1e-5;
+/** Without noise, as if k_B T were this much, in kJ/mol. */
+const double COLD = 1e-3;
+/** The largest turn of an iteration, and that of a step in which something holds a body off its centre, in rad. */
+const double LARGEST_TURN_OF_ITERATION = 1, LARGEST_TURN = 1.5;
+/** Of a planar body: it neither moves across its plane nor turns about directions in it. */
+const int ACROSS_PLANE[] = {2, 3, 4};
+
+void cross(const double* a, const double* b, double* result) {
+    result[0] = a[1]*b[2]-a[2]*b[1];
+    result[1] = a[2]*b[0]-a[0]*b[2];
+    result[2] = a[0]*b[1]-a[1]*b[0];
+}
+
+/** Find how a place moves with a motion of the centre and a turn. */
+void findMove(const double* change, const double* arm, double* move) {
+    cross(change+3, arm, move);
+    for (int k = 0; k < 3; k++)
+        move[k] += change[k];
+}
+
+/** Add the force on a place to that on the centre and to the torque. */
+void addForce(const double* force, const double* arm, double* sums) {
+    double torque[3];
+    cross(arm, force, torque);
+    for (int k = 0; k < 3; k++) {
+        sums[k] += force[k];
+        sums[3+k] += torque[k];
+    }
+}
+
+/** Add a symmetric matrix to one of the blocks on the diagonal. */
+void addBlock(const double* block, double factor, int first, double* matrix) {
+    int entry = 0;
+    for (int row = 0; row < 3; row++)
+        for (int column = row; column < 3; column++, entry++) {
+            matrix[6*(first+row)+first+column] += factor*block[entry];
+            if (column > row)
+                matrix[6*(first+column)+first+row] += factor*block[entry];
+        }
+}
+
+/** What couplings at one place do to six unknowns: how far the place moves by each of them. */
+struct PlaceMoves {
+    double moves[6][3];
+    explicit PlaceMoves(const double* arm) {
+        for (int i = 0; i < 6; i++) {
+            double unit[6] = {};
+            unit[i] = 1;
+            findMove(unit, arm, moves[i]);
+        }
+    }
+    void addStiffness(const double* stiffness, double* matrix) const {
+        for (int i = 0; i < 6; i++) {
+            double force[3];
+            multiply(stiffness, moves[i], force);
+            for (int j = 0; j < 6; j++)
+                matrix[6*j+i] += dot(moves[j], force);
+        }
+    }
+    void findCompliance(const double* inverse, double* compliance) const {
+        double half[6][3] = {};
+        for (int i = 0; i < 6; i++)
+            for (int j = 0; j < 6; j++)
+                for (int k = 0; k < 3; k++)
+                    half[i][k] += inverse[6*i+j]*moves[j][k];
+        int entry = 0;
+        for (int row = 0; row < 3; row++)
+            for (int column = row; column < 3; column++) {
+                double sum = 0;
+                for (int i = 0; i < 6; i++)
+                    sum += moves[i][row]*half[i][column];
+                compliance[entry++] = sum;
+            }
+    }
+};
+
+/** The inverse of a symmetric, positive definite matrix. */
+void invert(const double* matrix, double* inverse) {
+    const int n = 6;
+    double rest[n*n];
+    copy_n(matrix, n*n, rest);
+    fill_n(inverse, n*n, 0.0);
+    for (int i = 0; i < n; i++)
+        inverse[n*i+i] = 1;
+    for (int pivot = 0; pivot < n; pivot++) {
+        const double scale = 1/rest[n*pivot+pivot];
+        for (int k = 0; k < n; k++) {
+            rest[n*pivot+k] *= scale;
+            inverse[n*pivot+k] *= scale;
+        }
+        for (int row = 0; row < n; row++) {
+            const double factor = rest[n*row+pivot];
+            for (int k = 0; k < n && row != pivot; k++) {
+                rest[n*row+k] -= factor*rest[n*pivot+k];
+                inverse[n*row+k] -= factor*inverse[n*pivot+k];
+            }
+        }
+    }
+}
+
+/** Invert the equations of a body, of which some unknowns may be none. */
+void invert(const double* matrix, bool planar, bool turns, double* inverse) {
+    bool fixed[6] = {};
+    for (int i : ACROSS_PLANE)
+        fixed[i] = planar;
+    for (int i = 3; i < 6; i++)
+        fixed[i] |= !turns;
+    double reduced[36];
+    for (int i = 0; i < 6; i++)
+        for (int j = 0; j < 6; j++)
+            reduced[6*i+j] = !fixed[i] && !fixed[j] ? matrix[6*i+j] : i == j;
+    invert(reduced, inverse);
+    for (int i = 0; i < 6; i++)
+        if (fixed[i])
+            inverse[7*i] = 0;
+}
+
+void multiplySix(const double* matrix, const double* vector, double* result) {
+    for (int i = 0; i < 6; i++) {
+        result[i] = 0;
+        for (int j = 0; j < 6; j++)
+            result[i] += matrix[6*i+j]*vector[j];
+    }
+}
+
+/** The square root of a symmetric, positive definite matrix that is a triangle: times a vector. */
+void multiplyByRoot(const double* m, const double* v, double* result) {
+    const double xx = sqrt(m[0]), yx = m[1]/xx, zx = m[2]/xx, yy = sqrt(m[3]-yx*yx), zy = (m[4]-zx*yx)/yy,
+            zz = sqrt(m[5]-zx*zx-zy*zy);
+    result[0] = xx*v[0];
+    result[1] = yx*v[0]+yy*v[1];
+    result[2] = zx*v[0]+zy*v[1]+zz*v[2];
+}
+
+} // namespace
+
+BodyStep::BodyStep(const vector<RigidBody>& bodies) : bodies(bodies), states(bodies.size()),
+        right(6*bodies.size()) {
+    for (const RigidBody& own : bodies)
+        finders.emplace_back(own);
+}
+
+void BodyStep::begin(const double* newPositions, const double* forces, const double*, const StepSettings& newSettings,
+        const bool* taken) {
+    settings = newSettings;
+    positions = newPositions;
+    joints.clear();
+    for (size_t i = 0; i < bodies.size(); i++) {
+        State& body = states[i] = State();
+        body.taken = taken[i];
+        body.start = body.now = finders[i].find(bodies[i], positions);
+        sumForces(bodies[i], forces, body);
+        if (settings.flow.present)
+            describeFlow(bodies[i], body);
+    }
+    drawNoise();
+}
+
+void BodyStep::sumForces(const RigidBody& own, const double* forces, State& body) const {
+    for (size_t i = 0; i < own.particles.size(); i++)
+        for (int row = 0; row < 3; row++) {
+            const double force = forces[3*own.particles[i]+row];
+            body.force[row] += force;
+            for (int column = 0; column < 3; column++)
+                body.moments[3*row+column] += force*own.places[3*i+column];
+        }
+}
+
+/** The velocity half-way, so that bodies keep to closed streamlines, and half the curl. */
+void BodyStep::describeFlow(const RigidBody& own, State& body) const {
+    double halfway[3], velocity[3];
+    settings.flow.getVelocity(body.start.centre, velocity);
+    for (int k = 0; k < 3; k++)
+        halfway[k] = body.start.centre[k]+(own.planar && k == 2 ? 0 : 0.5*settings.stepSize*velocity[k]);
+    settings.flow.getVelocity(halfway, velocity);
+    const double* const gradient = settings.flow.gradient;
+    const double curl[] = {gradient[7]-gradient[5], gradient[2]-gradient[6], gradient[3]-gradient[1]};
+    for (int k = 0; k < 3; k++) {
+        body.drift[k] = settings.stepSize*velocity[k];
+        body.spin[k] = 0.5*settings.stepSize*curl[k];
+    }
+}
+
+void BodyStep::drawNoise() {
+    // The first particle has the noise of the motion, the second that of the turn.
+    const size_t count = 2*bodies.size();
+    vector<uint32_t> noChains(count, 0), parts(count);
+    vector<double> normals(4*count);
+    for (size_t i = 0; i < count; i++)
+        parts[i] = bodies[i/2].particles[i%2];
+    drawNormals({(uint32_t) settings.seed, (uint32_t) settings.level, settings.step}, NoiseKind::Particle,
+            noChains.data(), parts.data(), count, normals.data());
+    const double amplitude = sqrt(2*settings.kT/settings.stepSize);
+    for (size_t i = 0; i < bodies.size(); i++) {
+        const double* const own = &normals[8*i];
+        multiplyByRoot(bodies[i].rotationalFriction, own+4, states[i].randomTorque);
+        for (int k = 0; k < 3; k++) {
+            states[i].randomForce[k] = amplitude*sqrt(bodies[i].friction)*own[k];
+            states[i].randomTorque[k] *= amplitude;
+        }
+    }
+}
+
+/** Find the friction against turning in a frame half-way between those before and after the step. */
+void BodyStep::findFriction(const RigidBody& own, State& body) const {
+    double half[3];
+    GibbsVector::halve(body.turned, half);
+    RigidFrame halfway;
+    GibbsVector::turn(half, body.start, halfway);
+    halfway.turnMatrix(own.rotationalFriction, body.rotationalFriction);
+}
+
+/** Find where places are against centres, now and half-way. */
+void BodyStep::findArms() {
+    arms.resize(3*(size_t) numTerms);
+    meanArms.resize(3*(size_t) numTerms);
+    for (int i = 0; i < numTerms; i++) {
+        const State& body = states[terms[i].lane];
+        const double* const place = &bodies[terms[i].lane].places[3*terms[i].node];
+        double before[3];
+        body.start.turn(place, before);
+        body.now.turn(place, &arms[3*i]);
+        for (int k = 0; k < 3; k++)
+            meanArms[3*i+k] = 0.5*(before[k]+arms[3*i+k]);
+    }
+}
+
+void BodyStep::eliminate(const CouplingTerm* newTerms, int count, double* moves) {
+    terms = newTerms;
+    numTerms = count;
+    for (State& body : states)
+        body.held = false;
+    for (int i = 0; i < numTerms; i++) {
+        const double* const place = &bodies[terms[i].lane].places[3*terms[i].node];
+        states[terms[i].lane].held |= dot(place, place) > 0;
+    }
+    for (size_t i = 0; i < bodies.size(); i++) {
+        State& body = states[i];
+        if (!body.held)
+            turnFreely(bodies[i], body);
+        findFriction(bodies[i], body);
+    }
+    findArms();
+    findMetricTorques();
+    vector<double> pulls(bodies.size(), 0.0);
+    for (size_t i = 0; i < bodies.size(); i++) {
+        State& body = states[i];
+        setRight(bodies[i], body, &right[6*i]);
+        const double friction = bodies[i].friction/settings.stepSize;
+        const double isotropic[] = {friction, 0, 0, friction, 0, friction};
+        fill_n(body.matrix, 36, 0.0);
+        addBlock(isotropic, 1, 0, body.matrix);
+        addBlock(body.rotationalFriction, 1/settings.stepSize, 3, body.matrix);
+    }
+    for (int i = 0; i < numTerms; i++) {
+        State& body = states[terms[i].lane];
+        const double* const arm = &arms[3*i];
+        PlaceMoves(arm).addStiffness(terms[i].stiffness, body.matrix);
+        double* const own = &right[6*terms[i].lane];
+        addForce(terms[i].force, &meanArms[3*i], own);
+        // As the body turns, so does the arm that the force has: what makes it longer is left out.
+        const double outwards = dot(terms[i].force, arm), square = dot(arm, arm);
+        pulls[terms[i].lane] += fabs(outwards);
+        if (!(outwards > 0 && square > 0))
+            continue;
+        double along[6];
+        setOuter(-0.5*outwards/square, arm, along);
+        for (int k : {0, 3, 5})
+            along[k] += 0.5*outwards;
+        addBlock(along, 1, 3, body.matrix);
+    }
+    for (size_t i = 0; i < bodies.size(); i++) {
+        State& body = states[i];
+        body.pull = pulls[i]/((body.matrix[21]+body.matrix[28]+body.matrix[35])/3);
+        invert(body.matrix, bodies[i].planar, body.held, body.inverse);
+        multiplySix(body.inverse, &right[6*i], body.change);
+    }
+    gatherMoves(moves);
+}
+
+/** What is left of the balance of forces and torques, without the forces of couplings. */
+void BodyStep::setRight(const RigidBody& own, const State& body, double* result) const {
+    double random[3], lag[3], drag[3], half[3];
+    GibbsVector::halve(body.turned, half);
+    RigidFrame halfway;
+    GibbsVector::turn(half, body.start, halfway);
+    halfway.turn(body.randomTorque, random);
+    for (int k = 0; k < 3; k++)
+        lag[k] = (body.turned[k]-body.spin[k])/settings.stepSize;
+    multiply(body.rotationalFriction, lag, drag);
+    // The sum of F aT, with arms half-way.
+    double products[9];
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 3; column++)
+            products[3*row+column] = 0.5*(dot(&body.moments[3*row], &body.start.rotation[3*column])+
+                    dot(&body.moments[3*row], &body.now.rotation[3*column]));
+    const double torque[] = {products[7]-products[5], products[2]-products[6], products[3]-products[1]};
+    for (int k = 0; k < 3; k++) {
+        result[k] = body.force[k]+body.randomForce[k]-own.friction/settings.stepSize*(body.moved[k]-body.drift[k]);
+        result[3+k] = torque[k]+random[k]-drag[k]+body.metricTorque[k];
+    }
+}
+
+/** Turn a body that nothing holds off its centre. */
+void BodyStep::turnFreely(const RigidBody& own, State& body) const {
+    double torque[3], friction[6], random[3];
+    body.start.turn(body.randomTorque, random);
+    body.start.turnMatrix(own.rotationalFriction, friction);
+    double products[9];
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 3; column++)
+            products[3*row+column] = dot(&body.moments[3*row], &body.start.rotation[3*column]);
+    const double ofForces[] = {products[7]-products[5], products[2]-products[6], products[3]-products[1]};
+    for (int k = 0; k < 3; k++)
+        torque[k] = ofForces[k]+random[k];
+    double matrix[36] = {}, inverse[36], all[6] = {}, vector[6];
+    const double ones[] = {1, 0, 0, 1, 0, 1};
+    addBlock(ones, 1, 0, matrix);
+    addBlock(friction, 1/settings.stepSize, 3, matrix);
+    copy_n(torque, 3, all+3);
+    invert(matrix, own.planar, true, inverse);
+    multiplySix(inverse, all, vector);
+    for (int k = own.planar ? 2 : 0; k < 3; k++)
+        vector[3+k] += body.spin[k];
+    if (!body.taken)
+        fill_n(vector, 6, 0.0);
+    GibbsVector::fromRotationVector(vector+3, body.turned);
+    GibbsVector::turn(body.turned, body.start, body.now);
+}
+
+void BodyStep::setJointStiffness(const double* stiffness) {
+    joints.assign(terms, terms+numTerms);
+    for (int i = 0; i < numTerms; i++)
+        copy_n(stiffness+6*i, 6, joints[i].stiffness);
+    for (State& body : states)
+        body.settled = false;
+}
+
+void BodyStep::findMetricTorques() {
+    vector<double> matrices(36*bodies.size());
+    vector<PlaceMoves> places;
+    for (size_t i = 0; i < bodies.size(); i++) {
+        const double perStep = bodies[i].friction/settings.stepSize;
+        const double isotropic[] = {perStep, 0, 0, perStep, 0, perStep};
+        fill_n(states[i].metricTorque, 3, 0.0);
+        addBlock(isotropic, 1, 0, &matrices[36*i]);
+        addBlock(states[i].rotationalFriction, 1/settings.stepSize, 3, &matrices[36*i]);
+    }
+    for (const CouplingTerm& joint : joints) {
+        const State& body = states[joint.lane];
+        const double* const place = &bodies[joint.lane].places[3*joint.node];
+        double before[3], arm[3];
+        body.start.turn(place, before);
+        body.now.turn(place, arm);
+        for (int k = 0; k < 3; k++)
+            arm[k] = 0.5*(before[k]+arm[k]);
+        places.emplace_back(arm);
+        places.back().addStiffness(joint.stiffness, &matrices[36*joint.lane]);
+    }
+    for (size_t i = 0; i < bodies.size() && !joints.empty(); i++) {
+        double inverse[36];
+        invert(&matrices[36*i], bodies[i].planar, states[i].held, inverse);
+        copy_n(inverse, 36, &matrices[36*i]);
+    }
+    for (size_t i = 0; i < joints.size(); i++) {
+        const double* const k = joints[i].stiffness;
+        double c[6];
+        places[i].findCompliance(&matrices[36*joints[i].lane], c);
+        const double a[] = {k[1]*c[2]+k[3]*c[4]+k[4]*c[5]-c[1]*k[2]-c[3]*k[4]-c[4]*k[5],
+                k[2]*c[0]+k[4]*c[1]+k[5]*c[2]-c[2]*k[0]-c[4]*k[1]-c[5]*k[2],
+                k[0]*c[1]+k[1]*c[3]+k[2]*c[4]-c[0]*k[1]-c[1]*k[3]-c[2]*k[4]};
+        for (int axis = 0; axis < 3; axis++)
+            states[joints[i].lane].metricTorque[axis] += settings.kT*a[axis];
+    }
+}
+
+/** Find how places move from the changes of bodies. */
+void BodyStep::gatherMoves(double* moves) const {
+    for (int i = 0; i < numTerms; i++) {
+        double move[3];
+        findMove(states[terms[i].lane].change, &arms[3*i], move);
+        for (int k = 0; k < 3; k++)
+            moves[TermBlocks::place(i, k)] = move[k];
+    }
+}
+
+/** Find the forces on bodies from those on places. */
+template <class Number> void BodyStep::gatherForces(const Number* onPlaces) {
+    fill(right.begin(), right.end(), 0.0);
+    for (int i = 0; i < numTerms; i++) {
+        double force[3];
+        for (int k = 0; k < 3; k++)
+            force[k] = onPlaces[TermBlocks::place(i, k)];
+        addForce(force, &arms[3*i], &right[6*terms[i].lane]);
+    }
+}
+
+template <class Number> void BodyStep::respondAs(const Number* onPlaces, Number* moves) {
+    gatherForces(onPlaces);
+    vector<double> changes(right.size());
+    for (size_t i = 0; i < bodies.size(); i++)
+        multiplySix(states[i].inverse, &right[6*i], &changes[6*i]);
+    for (int i = 0; i < numTerms; i++) {
+        double move[3];
+        findMove(&changes[6*terms[i].lane], &arms[3*i], move);
+        for (int k = 0; k < 3; k++)
+            moves[TermBlocks::place(i, k)] = move[k];
+    }
+}
+
+void BodyStep::respond(const double* onPlaces, double* moves) {
+    respondAs(onPlaces, moves);
+}
+
+void BodyStep::respond(const float* onPlaces, float* moves) {
+    respondAs(onPlaces, moves);
+}
+
+void BodyStep::findCompliances(double* compliances) {
+    for (int i = 0; i < numTerms; i++)
+        PlaceMoves(&arms[3*i]).findCompliance(states[terms[i].lane].inverse, compliances+6*i);
+}
+
+void BodyStep::advance(const double* onPlaces, const ShareOfChange& share, bool* unfinished, double* moves) {
+    if (onPlaces != NULL) {
+        gatherForces(onPlaces);
+        for (size_t i = 0; i < bodies.size(); i++) {
+            double added[6];
+            multiplySix(states[i].inverse, &right[6*i], added);
+            for (int k = 0; k < 6; k++)
+                states[i].change[k] += added[k];
+        }
+        gatherMoves(moves);
+    }
+    for (size_t i = 0; i < bodies.size(); i++) {
+        unfinished[i] = states[i].taken && isUnfinished(states[i]);
+        if (states[i].taken)
+            makeChange(states[i], share);
+        states[i].settled = true;
+    }
+}
+
+/** The equations of a body that nothing holds off its centre are linear. */
+bool BodyStep::isUnfinished(const State& body) const {
+    if (!body.held)
+        return false;
+    if (!body.settled)
+        return true;
+    double forces[6], work = 0;
+    multiplySix(body.matrix, body.change, forces);
+    for (int k = 0; k < 6; k++)
+        work += forces[k]*body.change[k];
+    // What comes after this change is less by the turn, and by the part of the equations that is left out.
+    const double less = min(1.0, sqrt(dot(body.turned, body.turned))+sqrt(dot(body.change+3, body.change+3))+body.pull);
+    return !(work*less*less < LEAST_WORK*max(settings.kT, COLD));
+}
+
+void BodyStep::makeChange(State& body, const ShareOfChange& share) const {
+    for (int k = 0; k < 3; k++)
+        body.moved[k] += share.part*body.change[k];
+    if (!body.held)
+        return;
+    double turn[3];
+    copy_n(body.change+3, 3, turn);
+    const double angle = sqrt(dot(turn, turn)), most = min(share.largestTurn, LARGEST_TURN_OF_ITERATION);
+    const double part = min(share.part, angle > most ? most/angle : 1);
+    for (double& component : turn)
+        component *= part;
+    // Half a turn or more is told by findExcessiveChanges().
+    GibbsVector::follow(turn, body.turned);
+    GibbsVector::turn(body.turned, body.start, body.now);
+}
+
+void BodyStep::findExcessiveChanges(bool* failed) const {
+    for (size_t i = 0; i < bodies.size(); i++) {
+        const State& body = states[i];
+        const double turn = dot(body.turned, body.turned);
+        failed[i] = !isfinite(dot(body.moved, body.moved)) || !isfinite(turn) ||
+                (body.held && turn > LARGEST_TURN*LARGEST_TURN);
+    }
+}
+
+template <class Function> void BodyStep::visitPlaces(Function function) const {
+    for (size_t i = 0; i < bodies.size(); i++) {
+        const State& body = states[i];
+        for (size_t place = 0; place < bodies[i].particles.size() && body.taken; place++) {
+            double arm[3];
+            body.now.turn(&bodies[i].places[3*place], arm);
+            for (int k = 0; k < 3; k++)
+                function(3*bodies[i].particles[place]+k, body.start.centre[k]+body.moved[k]+arm[k]);
+        }
+    }
+}
+
+void BodyStep::getPositions(const double* start, double* result) const {
+    visitPlaces([&] (int number, double end) {
+        result[number] = start[number]+(end-positions[number]);
+    });
+}
+
+void BodyStep::getDisplacements(double* displacements) const {
+    visitPlaces([&] (int number, double end) {
+        displacements[number] = end-positions[number];
+    });
+}
