@@ -15,7 +15,7 @@ const double LEAST_WORK = 1e-5;
 /** Without noise, as if k_B T were this much, in kJ/mol. */
 const double COLD = 1e-3;
 /** The largest turn of an iteration, and that of a step in which something holds a body off its centre, in rad. */
-const double LARGEST_TURN_OF_ITERATION = 1, LARGEST_TURN = 1.5;
+const double LARGEST_TURN_OF_ITERATION = 1, LARGEST_TURN = 6;
 /** Of a planar body: it neither moves across its plane nor turns about directions in it. */
 const int ACROSS_PLANE[] = {2, 3, 4};
 
@@ -159,9 +159,18 @@ void BodyStep::begin(const double* newPositions, const double* forces, const dou
     settings = newSettings;
     positions = newPositions;
     joints.clear();
+    going.clear();
     for (size_t i = 0; i < bodies.size(); i++) {
-        State& body = states[i] = State();
+        State& body = states[i];
         body.taken = taken[i];
+        if (!body.taken) {
+            fill_n(body.inverse, 36, 0.0);
+            fill_n(body.change, 6, 0.0);
+            continue;
+        }
+        going.push_back(i);
+        body = State();
+        body.taken = true;
         body.start = body.now = finders[i].find(bodies[i], positions);
         sumForces(bodies[i], forces, body);
         if (settings.flow.present)
@@ -242,13 +251,13 @@ void BodyStep::findArms() {
 void BodyStep::eliminate(const CouplingTerm* newTerms, int count, double* moves) {
     terms = newTerms;
     numTerms = count;
-    for (State& body : states)
-        body.held = false;
+    for (int i : going)
+        states[i].held = false;
     for (int i = 0; i < numTerms; i++) {
         const double* const place = &bodies[terms[i].lane].places[3*terms[i].node];
         states[terms[i].lane].held |= dot(place, place) > 0;
     }
-    for (size_t i = 0; i < bodies.size(); i++) {
+    for (int i : going) {
         State& body = states[i];
         if (!body.held)
             turnFreely(bodies[i], body);
@@ -256,12 +265,12 @@ void BodyStep::eliminate(const CouplingTerm* newTerms, int count, double* moves)
     }
     findArms();
     findMetricTorques();
-    vector<double> pulls(bodies.size(), 0.0);
-    for (size_t i = 0; i < bodies.size(); i++) {
+    for (int i : going) {
         State& body = states[i];
         setRight(bodies[i], body, &right[6*i]);
         const double friction = bodies[i].friction/settings.stepSize;
         const double isotropic[] = {friction, 0, 0, friction, 0, friction};
+        body.pull = 0;
         fill_n(body.matrix, 36, 0.0);
         addBlock(isotropic, 1, 0, body.matrix);
         addBlock(body.rotationalFriction, 1/settings.stepSize, 3, body.matrix);
@@ -274,7 +283,7 @@ void BodyStep::eliminate(const CouplingTerm* newTerms, int count, double* moves)
         addForce(terms[i].force, &meanArms[3*i], own);
         // As the body turns, so does the arm that the force has: what makes it longer is left out.
         const double outwards = dot(terms[i].force, arm), square = dot(arm, arm);
-        pulls[terms[i].lane] += fabs(outwards);
+        body.pull += fabs(outwards);
         if (!(outwards > 0 && square > 0))
             continue;
         double along[6];
@@ -283,9 +292,9 @@ void BodyStep::eliminate(const CouplingTerm* newTerms, int count, double* moves)
             along[k] += 0.5*outwards;
         addBlock(along, 1, 3, body.matrix);
     }
-    for (size_t i = 0; i < bodies.size(); i++) {
+    for (int i : going) {
         State& body = states[i];
-        body.pull = pulls[i]/((body.matrix[21]+body.matrix[28]+body.matrix[35])/3);
+        body.pull /= (body.matrix[21]+body.matrix[28]+body.matrix[35])/3;
         invert(body.matrix, bodies[i].planar, body.held, body.inverse);
         multiplySix(body.inverse, &right[6*i], body.change);
     }
@@ -336,8 +345,6 @@ void BodyStep::turnFreely(const RigidBody& own, State& body) const {
     multiplySix(inverse, all, vector);
     for (int k = own.planar ? 2 : 0; k < 3; k++)
         vector[3+k] += body.spin[k];
-    if (!body.taken)
-        fill_n(vector, 6, 0.0);
     GibbsVector::fromRotationVector(vector+3, body.turned);
     GibbsVector::turn(body.turned, body.start, body.now);
 }
@@ -351,9 +358,11 @@ void BodyStep::setJointStiffness(const double* stiffness) {
 }
 
 void BodyStep::findMetricTorques() {
+    if (joints.empty())
+        return;
     vector<double> matrices(36*bodies.size());
     vector<PlaceMoves> places;
-    for (size_t i = 0; i < bodies.size(); i++) {
+    for (int i : going) {
         const double perStep = bodies[i].friction/settings.stepSize;
         const double isotropic[] = {perStep, 0, 0, perStep, 0, perStep};
         fill_n(states[i].metricTorque, 3, 0.0);
@@ -371,7 +380,7 @@ void BodyStep::findMetricTorques() {
         places.emplace_back(arm);
         places.back().addStiffness(joint.stiffness, &matrices[36*joint.lane]);
     }
-    for (size_t i = 0; i < bodies.size() && !joints.empty(); i++) {
+    for (int i : going) {
         double inverse[36];
         invert(&matrices[36*i], bodies[i].planar, states[i].held, inverse);
         copy_n(inverse, 36, &matrices[36*i]);
@@ -412,7 +421,7 @@ template <class Number> void BodyStep::gatherForces(const Number* onPlaces) {
 template <class Number> void BodyStep::respondAs(const Number* onPlaces, Number* moves) {
     gatherForces(onPlaces);
     vector<double> changes(right.size());
-    for (size_t i = 0; i < bodies.size(); i++)
+    for (int i : going)
         multiplySix(states[i].inverse, &right[6*i], &changes[6*i]);
     for (int i = 0; i < numTerms; i++) {
         double move[3];
@@ -438,7 +447,7 @@ void BodyStep::findCompliances(double* compliances) {
 void BodyStep::advance(const double* onPlaces, const ShareOfChange& share, bool* unfinished, double* moves) {
     if (onPlaces != NULL) {
         gatherForces(onPlaces);
-        for (size_t i = 0; i < bodies.size(); i++) {
+        for (int i : going) {
             double added[6];
             multiplySix(states[i].inverse, &right[6*i], added);
             for (int k = 0; k < 6; k++)
@@ -446,10 +455,10 @@ void BodyStep::advance(const double* onPlaces, const ShareOfChange& share, bool*
         }
         gatherMoves(moves);
     }
-    for (size_t i = 0; i < bodies.size(); i++) {
-        unfinished[i] = states[i].taken && isUnfinished(states[i]);
-        if (states[i].taken)
-            makeChange(states[i], share);
+    fill_n(unfinished, bodies.size(), false);
+    for (int i : going) {
+        unfinished[i] = isUnfinished(states[i]);
+        makeChange(states[i], share);
         states[i].settled = true;
     }
 }
@@ -486,7 +495,8 @@ void BodyStep::makeChange(State& body, const ShareOfChange& share) const {
 }
 
 void BodyStep::findExcessiveChanges(bool* failed) const {
-    for (size_t i = 0; i < bodies.size(); i++) {
+    fill_n(failed, bodies.size(), false);
+    for (int i : going) {
         const State& body = states[i];
         const double turn = dot(body.turned, body.turned);
         failed[i] = !isfinite(dot(body.moved, body.moved)) || !isfinite(turn) ||
@@ -495,9 +505,9 @@ void BodyStep::findExcessiveChanges(bool* failed) const {
 }
 
 template <class Function> void BodyStep::visitPlaces(Function function) const {
-    for (size_t i = 0; i < bodies.size(); i++) {
+    for (int i : going) {
         const State& body = states[i];
-        for (size_t place = 0; place < bodies[i].particles.size() && body.taken; place++) {
+        for (size_t place = 0; place < bodies[i].particles.size(); place++) {
             double arm[3];
             body.now.turn(&bodies[i].places[3*place], arm);
             for (int k = 0; k < 3; k++)

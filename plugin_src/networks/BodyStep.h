@@ -91,6 +91,8 @@ private:
     std::vector<RigidFrameFinder> finders;
     StepSettings settings = {};
     std::vector<State> states;
+    /** The bodies that take the step. */
+    std::vector<int> going;
     /** Places whose stiffness is known, as terms; nothing else is of them. */
     std::vector<CouplingTerm> joints;
     /** Where the place of each term is against the centre now, and half-way. */

@@ -49,7 +49,7 @@ static TestGap gapBetween(const Spot& first, const Spot& second) {
 class Network {
 public:
     Network(const vector<Chain>& chains, const Array& x, int numParticles, Precision precision = Precision::Double) :
-            chains(chains), engine(chains), x(x), places(this->chains, beams, x.size()/3+numParticles) {
+            chains(chains), engine(chains), x(x), places(this->chains, beams, bodies, x.size()/3+numParticles) {
         vector<CoupledParticle> particles;
         for (int i = 0; i < numParticles; i++) {
             particles.push_back({(int) x.size()/3+i, 40.0+10*i});
@@ -264,6 +264,7 @@ private:
     }
     const vector<Chain> chains;
     const vector<BeamChain> beams;
+    const vector<RigidBody> bodies;
     const ChainEngine engine;
     Array x;
     ChainPlaces places;

@@ -199,7 +199,7 @@ void CylinderChainStepper::refuseTornChains() const {
 void CylinderChainStepper::refuseDeformedBodies() const {
     if (others.getBodies().empty())
         return;
-    const vector<Vec3> positions = getPositions();
+    vector<Vec3> positions = getPositions();
     for (size_t i = 0; i < others.getBodies().size(); i++) {
         const RigidBody& body = others.getBodies()[i];
         const double deformation = findDeformation(body, RigidFrameFinder(body).find(body, &positions[0][0]),
@@ -425,12 +425,12 @@ void CylinderChainStepper::reportCoupling(const BrokenCoupling& coupling, const 
         const StepSettings& settings) {
     const ChainList& list = chains.getList();
     auto isPart = [&] (const BrokenCoupling::Place& place) {return place.chain >= 0 && place.chain < list.size();};
-    auto particleOf = [&] (const BrokenCoupling::Place& place) {
+    auto particleAt = [&] (const BrokenCoupling::Place& place) {
         return place.chain < list.size() ? -1 : particleOf(place.chain, coupled);
     };
     auto describe = [&] (const BrokenCoupling::Place& place) {
         if (!isPart(place)) {
-            const int particle = particleOf(place);
+            const int particle = particleAt(place);
             return particle < 0 ? string("what does not move") : "particle "+to_string(particle);
         }
         const int chain = list.getNumberOfStep(place.chain);
@@ -444,7 +444,7 @@ void CylinderChainStepper::reportCoupling(const BrokenCoupling& coupling, const 
         swap(first, second);
     CylinderChainException::Place place;
     place.step = settings.step+1;
-    place.particle = max(particleOf(first), particleOf(second));
+    place.particle = max(particleAt(first), particleAt(second));
     stringstream message;
     if (isPart(first)) {
         place.chain = list.getNumberOfStep(first.chain);

@@ -171,7 +171,7 @@ public:
      * @return the index of the body
      */
     int addBody(const std::vector<int>& particles, const std::vector<double>& places, double friction,
-            const std::vector<double>& rotationalFriction, bool planar = false);
+            const std::vector<double>& rotationalFriction, bool planar);
     /**
      * Get the number of rigid bodies.
      */
