@@ -38,6 +38,7 @@ from .errors import (
     TimeStepWarning,
 )
 from .filaments.attachments import Attachment
+from .filaments.body import Body
 from .filaments.end_states import DynamicInstability, EndStates, TwoUnitCap
 from .filaments.filament import Filament, Tether
 from .filaments.filament_type import FilamentType
@@ -104,6 +105,7 @@ __all__ = [
     "EngineWarning",
     "EquilibrationWarning",
     "FILAMIN",
+    "Body",
     "F_ACTIN",
     "Filament",
     "FilamentOptions",

@@ -89,6 +89,7 @@ class CompiledEngine(Engine):
     has_linkers = True
     has_growth = True
     has_beam_elements = True
+    has_bodies = True
 
     def add_forces(self, system, placed, stretching_force_group, bending_force_group):
         """Add one CylinderChainForce, with one force group for stretching and bending."""
@@ -121,7 +122,8 @@ class CompiledEngine(Engine):
     def create_integrator(self, system, placed, settings):
         """Create a NativeIntegrator."""
         fixed_nodes(system, placed)
-        others, frictions = describe_other_particles(system, placed.nodes, settings.particle_friction)
+        inside = np.concatenate([placed.nodes, *placed.body_indices])
+        others, frictions = describe_other_particles(system, inside, settings.particle_friction)
         integrator = NativeIntegrator(
             settings.temperature,
             settings.step_size,
@@ -135,6 +137,8 @@ class CompiledEngine(Engine):
         )
         for particle, friction in zip(others, frictions):
             integrator.setParticleFriction(int(particle), float(friction))
+        for placed_body, particles in zip(placed.bodies, placed.body_indices):
+            _add_body(integrator, placed_body, particles, placed.viscosity)
         linkers = find_binding_force(system)
         if linkers is not None:
             linkers.setTemperature(settings.temperature)
@@ -237,6 +241,21 @@ def _add_chain(force, filament, nodes, viscosity, temperature):
         force.setSegmentPropulsion(chain, segment, filament.propulsion)
     for joint, stiffness in enumerate(filament.joint_stiffnesses):
         force.setJointParameters(chain, joint, float(stiffness))
+
+
+def _add_body(integrator, placed, particles, viscosity):
+    body, turn = placed.body, np.eye(3)
+    if placed.planar:
+        # In a frame that is not tilted, it turns about z.
+        turn = placed.rotation
+    rotational = turn @ body.rotational_friction(viscosity) @ turn.T
+    integrator.addBody(
+        [int(particle) for particle in particles],
+        ((body.points - body.centre) @ turn.T).ravel().tolist(),
+        body.friction(viscosity),
+        rotational[np.triu_indices(3)].tolist(),
+        placed.planar,
+    )
 
 
 def _add_beam_chain(force, filament, nodes, control_points, viscosity, temperature):

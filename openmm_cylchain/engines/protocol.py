@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import openmm
 
+from ..filaments.body import PlacedBody
 from ..filaments.filament import Filament, Tether
 from ..kinetics.linkers import Linkers
 from ..mechanics.flow import Flow
@@ -33,6 +34,9 @@ class PlacedFilaments:
         Whether linkers join nearest periodic images.
     control_point_indices : tuple of (n,) int arrays
         Particles of the control points of each filament; none of straight segments.
+    bodies : tuple of PlacedBody
+    body_indices : tuple of (n,) int arrays
+        Particles of each body.
     positions : (particles, 3) array
         In nm, of the System, while forces are added; empty later.
     """
@@ -45,6 +49,8 @@ class PlacedFilaments:
     linkers: tuple[Linkers, ...] = ()
     periodic: bool = False
     control_point_indices: tuple[np.ndarray, ...] = ()
+    bodies: tuple[PlacedBody, ...] = ()
+    body_indices: tuple[np.ndarray, ...] = ()
     positions: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
@@ -92,6 +98,9 @@ class Engine(ABC):
 
     has_beam_elements = False
     """Whether it moves filaments of beam elements."""
+
+    has_bodies = False
+    """Whether it moves rigid bodies."""
 
     @abstractmethod
     def add_forces(

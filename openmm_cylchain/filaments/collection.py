@@ -10,6 +10,7 @@ from ..mechanics.flow import Flow
 from ..mechanics.redistribution import ChainSet
 from ..units.types import Indices, IntArray, Vectors
 from .attachments import Attachment
+from .body import PlacedBody
 from .filament import Filament, Tether
 
 
@@ -43,6 +44,12 @@ class FilamentCollection(Protocol):
     def __getitem__(self, index: int) -> Filament: ...
 
     def __iter__(self) -> Iterator[Filament]: ...
+
+    @property
+    def bodies(self) -> tuple[PlacedBody, ...]: ...
+
+    @property
+    def body_indices(self) -> list[IntArray]: ...
 
     @property
     def viscosity(self) -> float: ...

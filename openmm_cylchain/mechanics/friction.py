@@ -188,6 +188,11 @@ def stokes_friction(diameter: Scalar, viscosity: Scalar) -> float:
     return 3.0 * math.pi * positive(viscosity, VISCOSITY, "viscosity") * positive(diameter, LENGTH, "diameter")
 
 
+def rotational_friction_of_sphere(diameter: Scalar, viscosity: Scalar) -> float:
+    """Rotational friction of a sphere, pi eta d^3, in kJ ps/mol."""
+    return math.pi * positive(viscosity, VISCOSITY, "viscosity") * positive(diameter, LENGTH, "diameter") ** 3
+
+
 def rotational_relaxation_time(friction: SegmentFriction, temperature: Scalar) -> float:
     """Relaxation time of the mean orientation of a free segment, eq. (29): gamma_rot/(2 k_B T), in ps."""
     require_kind(friction, SegmentFriction, "friction")

@@ -12,13 +12,14 @@ import numpy as np
 from ..engine_choice import choose_engine, load_engine
 from ..errors import InputError
 from ..filaments import shapes
+from ..filaments.body import Body, PlacedBody, place_body
 from ..filaments.chain_type import ChainType
 from ..filaments.filament import Filament
 from ..filaments.filament_type import FilamentType
 from ..filaments.growth import Growth
 from ..filaments.shapes import FilamentOptions
 from ..kinetics.nucleation import Nucleation, require_nucleation
-from ..units.quantities import TEMPERATURE, VISCOSITY, non_negative, positive, shown, whole_number
+from ..units.quantities import TEMPERATURE, VISCOSITY, non_negative, positive, shown, true_or_false, whole_number
 from ..units.types import IntArray, Scalar, Vector, Vectors
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ class AddedFilaments:
         self._viscosity = positive(viscosity, VISCOSITY, "viscosity")
         self._temperature = non_negative(temperature, TEMPERATURE, "temperature")
         self._filaments: list[Filament] = []
+        self._bodies: list[PlacedBody] = []
+        self._body_indices: Any = None
         self._periodic = False
         self._nodes: Any = None
         self._control_points: Any = None
@@ -81,6 +84,17 @@ class AddedFilaments:
     def temperature(self) -> float:
         """Temperature in K."""
         return self._temperature
+
+    @property
+    def bodies(self) -> tuple[PlacedBody, ...]:
+        """Tuple of the rigid bodies as they were added, in the order of their numbers."""
+        return tuple(self._bodies)
+
+    @property
+    def body_indices(self) -> list[IntArray]:
+        """Particle indices of the points of bodies, a list of an array for each, once they are in a System."""
+        self._refuse_unless_built()
+        return self._body_indices
 
     @property
     def node_indices(self) -> list[IntArray]:
@@ -295,6 +309,43 @@ class AddedFilaments:
         # Apart from each other, since forces between all particles of a System divide by distances.
         self._filaments += [replace(filament, positions=filament.positions + _reserve_place(own)) for own in numbers]
         return numbers
+
+    def add_body(
+        self, body: Body, position: Vector, orientation: Vectors | None = None, *, planar: bool = False
+    ) -> int:
+        """Add a rigid body: a bead, a vesicle, a spindle pole, cargo.
+
+        Its points become particles of the System, behind those of filaments: ``body_indices`` says which. Crosslinks
+        to them, anchors of linkers, contacts and walls are in the equations of the implicit step, which moves the body
+        and turns it, and however stiff they are they do not limit the step. All other forces on its particles act from
+        the start of a step.
+
+        Parameters
+        ----------
+        body : Body
+        position : (3,) length
+            Of the origin of its frame.
+        orientation : (3, 3) array, optional
+            A rotation matrix, which takes vectors from the frame of the body to that of space.
+        planar : bool
+            Whether it moves in its plane of constant z, and turns about z, alone.
+
+        Returns
+        -------
+        int
+            The body's number.
+
+        Raises
+        ------
+        InputError
+            If the engine has no bodies, the filaments are in a System already, or something is not what it should be.
+        """
+        label = f"Body {len(self._bodies)}"
+        self._refuse_if_built(label)
+        if not self._engine.has_bodies:
+            raise InputError(f"{label}: the {self._engine_name} engine has no rigid bodies: use the compiled one.")
+        self._bodies.append(place_body(body, position, orientation, true_or_false(planar, f"{label}: planar"), label))
+        return len(self._bodies) - 1
 
     def _refuse_if_built(self, label):
         if self._nodes is not None:

@@ -34,6 +34,7 @@ from ..units.quantities import TEMPERATURE, non_negative, require_kind, true_or_
 from ..units.types import BoxVectors, Numbers, Scalar, Vectors
 from .filaments_in_context import FilamentsInContext
 from .insertion import (
+    add_body_to_system,
     add_nodes_to_system,
     add_to_topology,
     check_force_groups,
@@ -122,7 +123,7 @@ class Filaments(TiedFilaments):
         """Put the filaments into an existing Topology and System, behind what is there.
 
         One filament becomes one chain of the Topology, with a residue and an atom (named "NOD") for each
-        node and bonds along it. Everything that was in the Topology and the System stays as it is.
+        node and bonds along it. Rigid bodies come behind them, each a chain with an atom (named "BOD") for each point. Everything that was in the Topology and the System stays as it is.
 
         Parameters
         ----------
@@ -175,6 +176,10 @@ class Filaments(TiedFilaments):
                 everything.insert(-1, filament.control_points)
             names = [self._attachments[index].name for index in self._attachments_of[number]]
             add_to_topology(topology, filament, f"F{number}", names)
+        self._body_indices = [
+            add_body_to_system(system, topology, placed, f"B{number}") for number, placed in enumerate(self._bodies)
+        ]
+        everything += [placed.positions for placed in self._bodies]
         count, positions = len(positions), np.concatenate(everything)
         add_noninteracting_entries(system, count, positions, self._coinciding())
         self._periodic = is_periodic(system)
@@ -308,7 +313,7 @@ class Filaments(TiedFilaments):
         temperature : temperature, optional
             That of the filaments if not given.
         particle_friction : energy*time/length^2, or array of them
-            Friction coefficients of the particles outside filaments, in the order of their indices; a
+            Friction coefficients of the particles outside filaments and rigid bodies, in the order of their indices; a
             number holds for all of them. Values for massless particles are ignored: those do not move.
             ``stokes_friction`` computes one. A particle that is added later, and can move, has none: its Context is
             refused (portable engine: its first step).
@@ -369,6 +374,8 @@ class Filaments(TiedFilaments):
         refuse_constraints(system, self._placed())
         scheme = default_scheme(self._engine_name) if scheme is None else scheme
         check_scheme(scheme)
+        if self._bodies and scheme != "implicit":
+            raise InputError(f"Rigid bodies are moved by scheme 'implicit' alone, not by {scheme!r}.")
         if scheme == MODES:
             for number, filament in enumerate(self):
                 refuse_modes(filament, filament_label(number, filament))

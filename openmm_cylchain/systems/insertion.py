@@ -9,6 +9,7 @@ import openmm
 from ..couplings.chain_forces import is_chain_force
 from ..couplings.periodicity import has_box, is_periodic
 from ..errors import InputError
+from ..filaments.body import BODY_NAME, PlacedBody
 from ..filaments.filament import CONTROL_POINT_NAME, NODE_NAME, Filament
 from ..units.quantities import LENGTH, in_units_of, require_kind, shown, vector, whole_number
 from ..units.types import BoxVectors, FloatArray, IntArray, Vectors
@@ -84,6 +85,22 @@ def add_to_topology(topology: "app.Topology", filament: Filament, name: str, att
         topology.addBond(first, second)
     if filament.closed:
         topology.addBond(atoms[nodes - 1], atoms[0])
+
+
+_BODY_MASS = 1.0
+"""In Da, of each point of a rigid body: motion is overdamped, so that any will do but none."""
+
+
+def add_body_to_system(system: openmm.System, topology: "app.Topology", placed: PlacedBody, name: str) -> IntArray:
+    """Add a rigid body to a System, and to a Topology as a chain of a residue and an atom for each point: the indices of
+    its particles."""
+    chain = topology.addChain(name)
+    particles = []
+    for number in range(len(placed.positions)):
+        residue = topology.addResidue(placed.body.name, chain, str(number + 1))
+        topology.addAtom(BODY_NAME, None, residue)
+        particles.append(system.addParticle(_BODY_MASS))
+    return np.array(particles)
 
 
 def set_box_vectors(system: openmm.System, box_vectors: BoxVectors) -> list[openmm.Vec3]:

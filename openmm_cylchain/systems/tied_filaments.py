@@ -308,4 +308,6 @@ class TiedFilaments(AddedFilaments):
             self.linkers,
             self._periodic,
             tuple(self._control_points),
+            tuple(self._bodies),
+            tuple(self.body_indices),
         )

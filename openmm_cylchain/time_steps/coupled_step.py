@@ -37,7 +37,7 @@ from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, Numbers
 from .coupled_forces import CoupledForces
 from .hard_contacts import longest_resolving_step
-from .other_particles import describe_other_particles
+from .other_particles import describe_beside_filaments
 from .time_step import TimeStep
 
 RELATIVE_MOTION = 0.6
@@ -154,8 +154,7 @@ def mobilities(filaments: FilamentCollection, system: openmm.System, particle_fr
         mobility[nodes] = filament.type.segment_kind.end_mobility * whole
     for particle, attachment in zip(filaments.attachment_indices, filaments.attachments):
         mobility[particle] = mobility[filaments.node_indices[attachment.filament][0]]
-    nodes = np.concatenate([*filaments.node_indices, *filaments.control_point_indices])
-    others, frictions = describe_other_particles(system, nodes, particle_friction)
+    others, frictions = describe_beside_filaments(system, filaments, particle_friction)
     mobility[others] = 1.0 / np.asarray(frictions, dtype=float)
     return mobility
 

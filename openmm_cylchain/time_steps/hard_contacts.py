@@ -25,7 +25,7 @@ from ..filaments.collection import FilamentCollection
 from ..units.text import format_time
 from ..units.types import Numbers
 from .coupled_forces import CoupledForces
-from .other_particles import describe_other_particles
+from .other_particles import describe_beside_filaments
 
 LARGEST_SOFTNESS = 18.0
 """Of k c: contacts that are softer in a step are hard ones there."""
@@ -105,8 +105,7 @@ def _chains_in_contact(filaments, contacts):
 
 
 def _mobility_of_spheres(filaments, system, contacts, particle_friction):
-    nodes = np.concatenate([*filaments.node_indices, *filaments.control_point_indices])
-    others, frictions = describe_other_particles(system, nodes, particle_friction)
+    others, frictions = describe_beside_filaments(system, filaments, particle_friction)
     mobility = dict(zip((int(one) for one in others), 1.0 / np.asarray(frictions, dtype=float)))
     return max((mobility.get(contacts.getSphereParticle(i), 0.0) for i in range(contacts.getNumSpheres())), default=0.0)
 

@@ -1,24 +1,37 @@
-"""The particles of a System outside filaments, and their friction."""
+"""The particles of a System outside filaments, those of rigid bodies among them, and their friction."""
 
 import numpy as np
 import openmm
 
 from ..errors import InputError
+from ..filaments.collection import FilamentCollection
 from ..units.quantities import FRICTION, in_units_of
 from ..units.types import FloatArray, Indices, IntArray, Numbers
+
+
+def describe_beside_filaments(
+    system: openmm.System, filaments: FilamentCollection, particle_friction: Numbers | None
+) -> tuple[IntArray, FloatArray]:
+    """Indices and friction coefficients of the mobile particles outside filaments, and of those of rigid bodies behind
+    them: the least that each of these has against motion of its own."""
+    bodies = [np.asarray(own, dtype=int) for own in filaments.body_indices]
+    inside = np.concatenate([*filaments.node_indices, *filaments.control_point_indices, *bodies])
+    others, frictions = describe_other_particles(system, inside, particle_friction)
+    of_bodies = [placed.body.place_frictions(filaments.viscosity) for placed in filaments.bodies]
+    return np.concatenate([others, *bodies]), np.concatenate([frictions, *of_bodies])
 
 
 def describe_other_particles(
     system: openmm.System, nodes: Indices, particle_friction: Numbers | None
 ) -> tuple[IntArray, FloatArray]:
-    """Indices and friction coefficients of the mobile particles outside filaments.
+    """Indices and friction coefficients of the mobile particles outside filaments and bodies.
 
     Parameters
     ----------
     nodes : int array
-        Particle indices of all nodes.
+        Particle indices of all nodes, and of bodies.
     particle_friction : energy*time/length^2, array of them, or None
-        In the order of the indices of the particles outside filaments, massless ones included.
+        In the order of the indices of the particles outside filaments and bodies, massless ones included.
 
     Raises
     ------

@@ -12,7 +12,7 @@ from ..filaments.collection import FilamentCollection
 from ..units.types import BoolArray, FloatArray, IntArray, Numbers
 from .beam_response import BeamResponse
 from .mobility import FilamentResponse, PlaceResponse
-from .other_particles import describe_other_particles
+from .other_particles import describe_beside_filaments
 from .springs import NOWHERE, Springs
 
 
@@ -53,8 +53,7 @@ class SpringPlaces:
         self._filaments = filaments
         self._scheme = scheme
         self._between = {number: place for place, number in between.items()}
-        nodes = np.concatenate([*filaments.node_indices, *filaments.control_point_indices])
-        others, frictions = describe_other_particles(system, nodes, particle_friction)
+        others, frictions = describe_beside_filaments(system, filaments, particle_friction)
         self._other_friction = dict(zip(others.tolist(), frictions.tolist()))
         self._responses: dict[Any, PlaceResponse] = {}
         particles = np.unique(np.concatenate([np.zeros(0, int), *(np.r_[s.first, s.second] for s in springs)]))

@@ -65,6 +65,16 @@ public:
     virtual void respond(const double* forces, double* moves) = 0;
     /** The same in single precision. */
     virtual void respond(const float* forces, float* moves) = 0;
+    /** Whether there may be more places than unknowns that move them, as on rigid bodies: see keepWhatMoves(). */
+    virtual bool mayMoveTogether() const {
+        return false;
+    }
+    /** Take off of forces on the places of the terms what moves none of them. */
+    virtual void keepWhatMoves(double*) {
+    }
+    /** The same in single precision. */
+    virtual void keepWhatMoves(float*) {
+    }
     /**
      * Find for each term how a force on its place moves this place: a symmetric matrix in the order of a term's
      * stiffness.

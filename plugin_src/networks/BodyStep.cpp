@@ -18,6 +18,9 @@ const double COLD = 1e-3;
 const double LARGEST_TURN_OF_ITERATION = 1, LARGEST_TURN = 6;
 /** Of a planar body: it neither moves across its plane nor turns about directions in it. */
 const int ACROSS_PLANE[] = {2, 3, 4};
+const double UNITY[] = {1, 0, 0, 1, 0, 1};
+/** Of forces on places: what less of them does to a body is lost. */
+const double LEAST_SHARE = 1e-12;
 
 void cross(const double* a, const double* b, double* result) {
     result[0] = a[1]*b[2]-a[2]*b[1];
@@ -40,6 +43,32 @@ void addForce(const double* force, const double* arm, double* sums) {
         sums[k] += force[k];
         sums[3+k] += torque[k];
     }
+}
+
+/** Add the products of a force with its place in the frame of the body, row by row. */
+void addProducts(const double* force, const double* place, double* products) {
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 3; column++)
+            products[3*row+column] += force[row]*place[column];
+}
+
+/** Find the torque of forces with such products. */
+void findTorque(const double* products, const RigidFrame& frame, double* torque) {
+    double turned[9];
+    for (int row = 0; row < 3; row++)
+        frame.turn(products+3*row, turned+3*row);
+    torque[0] = turned[7]-turned[5];
+    torque[1] = turned[2]-turned[6];
+    torque[2] = turned[3]-turned[1];
+}
+
+/** Find the sum of F.a of such forces. */
+double traceOfProducts(const double* products, const RigidFrame& frame) {
+    double sum = 0;
+    for (int row = 0; row < 3; row++)
+        for (int k = 0; k < 3; k++)
+            sum += products[3*row+k]*frame.rotation[3*row+k];
+    return sum;
 }
 
 /** Add a symmetric matrix to one of the blocks on the diagonal. */
@@ -171,6 +200,7 @@ void BodyStep::begin(const double* newPositions, const double* forces, const dou
         going.push_back(i);
         body = State();
         body.taken = true;
+        body.before = body.start;
         body.start = body.now = finders[i].find(bodies[i], positions);
         sumForces(bodies[i], forces, body);
         if (settings.flow.present)
@@ -180,13 +210,12 @@ void BodyStep::begin(const double* newPositions, const double* forces, const dou
 }
 
 void BodyStep::sumForces(const RigidBody& own, const double* forces, State& body) const {
-    for (size_t i = 0; i < own.particles.size(); i++)
-        for (int row = 0; row < 3; row++) {
-            const double force = forces[3*own.particles[i]+row];
-            body.force[row] += force;
-            for (int column = 0; column < 3; column++)
-                body.moments[3*row+column] += force*own.places[3*i+column];
-        }
+    for (size_t i = 0; i < own.particles.size(); i++) {
+        const double* const force = forces+3*own.particles[i];
+        for (int k = 0; k < 3; k++)
+            body.force[k] += force[k];
+        addProducts(force, &own.places[3*i], body.moments);
+    }
 }
 
 /** The velocity half-way, so that bodies keep to closed streamlines, and half the curl. */
@@ -233,26 +262,20 @@ void BodyStep::findFriction(const RigidBody& own, State& body) const {
     halfway.turnMatrix(own.rotationalFriction, body.rotationalFriction);
 }
 
-/** Find where places are against centres, now and half-way. */
+/** Find where places are against centres now. */
 void BodyStep::findArms() {
     arms.resize(3*(size_t) numTerms);
-    meanArms.resize(3*(size_t) numTerms);
-    for (int i = 0; i < numTerms; i++) {
-        const State& body = states[terms[i].lane];
-        const double* const place = &bodies[terms[i].lane].places[3*terms[i].node];
-        double before[3];
-        body.start.turn(place, before);
-        body.now.turn(place, &arms[3*i]);
-        for (int k = 0; k < 3; k++)
-            meanArms[3*i+k] = 0.5*(before[k]+arms[3*i+k]);
-    }
+    for (int i = 0; i < numTerms; i++)
+        states[terms[i].lane].now.turn(&bodies[terms[i].lane].places[3*terms[i].node], &arms[3*i]);
 }
 
 void BodyStep::eliminate(const CouplingTerm* newTerms, int count, double* moves) {
     terms = newTerms;
     numTerms = count;
-    for (int i : going)
+    for (int i : going) {
         states[i].held = false;
+        fill_n(states[i].pulls, 9, 0.0);
+    }
     for (int i = 0; i < numTerms; i++) {
         const double* const place = &bodies[terms[i].lane].places[3*terms[i].node];
         states[terms[i].lane].held |= dot(place, place) > 0;
@@ -264,37 +287,28 @@ void BodyStep::eliminate(const CouplingTerm* newTerms, int count, double* moves)
         findFriction(bodies[i], body);
     }
     findArms();
+    findPulls();
     findMetricTorques();
+    findProjections();
     for (int i : going) {
         State& body = states[i];
         setRight(bodies[i], body, &right[6*i]);
         const double friction = bodies[i].friction/settings.stepSize;
         const double isotropic[] = {friction, 0, 0, friction, 0, friction};
-        body.pull = 0;
         fill_n(body.matrix, 36, 0.0);
         addBlock(isotropic, 1, 0, body.matrix);
         addBlock(body.rotationalFriction, 1/settings.stepSize, 3, body.matrix);
+        // As the body turns, so do the arms of forces: what makes these longer is left out.
+        const double outwards = 0.5*max(0.0, traceOfProducts(body.pulls, body.now));
+        const double resistance[] = {outwards, 0, 0, outwards, 0, outwards};
+        addBlock(resistance, 1, 3, body.matrix);
     }
     for (int i = 0; i < numTerms; i++) {
-        State& body = states[terms[i].lane];
-        const double* const arm = &arms[3*i];
-        PlaceMoves(arm).addStiffness(terms[i].stiffness, body.matrix);
-        double* const own = &right[6*terms[i].lane];
-        addForce(terms[i].force, &meanArms[3*i], own);
-        // As the body turns, so does the arm that the force has: what makes it longer is left out.
-        const double outwards = dot(terms[i].force, arm), square = dot(arm, arm);
-        body.pull += fabs(outwards);
-        if (!(outwards > 0 && square > 0))
-            continue;
-        double along[6];
-        setOuter(-0.5*outwards/square, arm, along);
-        for (int k : {0, 3, 5})
-            along[k] += 0.5*outwards;
-        addBlock(along, 1, 3, body.matrix);
+        PlaceMoves(&arms[3*i]).addStiffness(terms[i].stiffness, states[terms[i].lane].matrix);
+        addForce(terms[i].force, &arms[3*i], &right[6*terms[i].lane]);
     }
     for (int i : going) {
         State& body = states[i];
-        body.pull /= (body.matrix[21]+body.matrix[28]+body.matrix[35])/3;
         invert(body.matrix, bodies[i].planar, body.held, body.inverse);
         multiplySix(body.inverse, &right[6*i], body.change);
     }
@@ -311,16 +325,33 @@ void BodyStep::setRight(const RigidBody& own, const State& body, double* result)
     for (int k = 0; k < 3; k++)
         lag[k] = (body.turned[k]-body.spin[k])/settings.stepSize;
     multiply(body.rotationalFriction, lag, drag);
-    // The sum of F aT, with arms half-way.
-    double products[9];
-    for (int row = 0; row < 3; row++)
-        for (int column = 0; column < 3; column++)
-            products[3*row+column] = 0.5*(dot(&body.moments[3*row], &body.start.rotation[3*column])+
-                    dot(&body.moments[3*row], &body.now.rotation[3*column]));
-    const double torque[] = {products[7]-products[5], products[2]-products[6], products[3]-products[1]};
+    // Forces have the mean of the arms before and now. Those of couplings are to have the arm of now in the equations,
+    // which are consistent then: forces that an iteration finds because turns are no shifts vanish in the next one.
+    double before[3], now[3], pullsBefore[3], pullsNow[3];
+    findTorque(body.moments, body.start, before);
+    findTorque(body.moments, body.now, now);
+    findTorque(body.pulls, body.start, pullsBefore);
+    findTorque(body.pulls, body.now, pullsNow);
     for (int k = 0; k < 3; k++) {
         result[k] = body.force[k]+body.randomForce[k]-own.friction/settings.stepSize*(body.moved[k]-body.drift[k]);
-        result[3+k] = torque[k]+random[k]-drag[k]+body.metricTorque[k];
+        result[3+k] = 0.5*(before[k]+now[k]+pullsBefore[k]-pullsNow[k])+random[k]-drag[k]+body.metricTorque[k];
+    }
+}
+
+/** Find the forces of couplings, as they would be if the last turn had been a shift: see setRight(). */
+void BodyStep::findPulls() {
+    for (int i = 0; i < numTerms; i++) {
+        State& body = states[terms[i].lane];
+        const double* const place = &bodies[terms[i].lane].places[3*terms[i].node];
+        double before[3], shift[3], force[3];
+        body.before.turn(place, before);
+        cross(body.lastTurn, before, shift);
+        for (int k = 0; k < 3; k++)
+            shift[k] = arms[3*i+k]-before[k]-shift[k];
+        multiply(terms[i].stiffness, shift, force);
+        for (int k = 0; k < 3; k++)
+            force[k] += terms[i].force[k];
+        addProducts(force, place, body.pulls);
     }
 }
 
@@ -329,16 +360,11 @@ void BodyStep::turnFreely(const RigidBody& own, State& body) const {
     double torque[3], friction[6], random[3];
     body.start.turn(body.randomTorque, random);
     body.start.turnMatrix(own.rotationalFriction, friction);
-    double products[9];
-    for (int row = 0; row < 3; row++)
-        for (int column = 0; column < 3; column++)
-            products[3*row+column] = dot(&body.moments[3*row], &body.start.rotation[3*column]);
-    const double ofForces[] = {products[7]-products[5], products[2]-products[6], products[3]-products[1]};
+    findTorque(body.moments, body.start, torque);
     for (int k = 0; k < 3; k++)
-        torque[k] = ofForces[k]+random[k];
+        torque[k] += random[k];
     double matrix[36] = {}, inverse[36], all[6] = {}, vector[6];
-    const double ones[] = {1, 0, 0, 1, 0, 1};
-    addBlock(ones, 1, 0, matrix);
+    addBlock(UNITY, 1, 0, matrix);
     addBlock(friction, 1/settings.stepSize, 3, matrix);
     copy_n(torque, 3, all+3);
     invert(matrix, own.planar, true, inverse);
@@ -355,6 +381,45 @@ void BodyStep::setJointStiffness(const double* stiffness) {
         copy_n(stiffness+6*i, 6, joints[i].stiffness);
     for (State& body : states)
         body.settled = false;
+}
+
+/** Find how forces and torques on bodies are those of forces on their places, of which these are the least. */
+void BodyStep::findProjections() {
+    for (int i : going)
+        fill_n(states[i].projection, 36, 0.0);
+    for (int i = 0; i < numTerms; i++)
+        PlaceMoves(&arms[3*i]).addStiffness(UNITY, states[terms[i].lane].projection);
+    for (int i : going) {
+        double* const own = states[i].projection;
+        double regular[36];
+        const double lengths[] = {own[0], own[21]+own[28]+own[35]};
+        copy_n(own, 36, regular);
+        for (int k = 0; k < 6; k++)
+            regular[7*k] += LEAST_SHARE*(lengths[k/3]+(lengths[k/3] > 0 ? 0 : 1));
+        invert(regular, own);
+    }
+}
+
+/** Take off what forces of places of a body against each other do not move it by. */
+template <class Number> void BodyStep::project(Number* onPlaces) {
+    gatherForces(onPlaces);
+    vector<double> least(right.size());
+    for (int i : going)
+        multiplySix(states[i].projection, &right[6*i], &least[6*i]);
+    for (int i = 0; i < numTerms; i++) {
+        double force[3];
+        findMove(&least[6*terms[i].lane], &arms[3*i], force);
+        for (int k = 0; k < 3; k++)
+            onPlaces[TermBlocks::place(i, k)] = force[k];
+    }
+}
+
+void BodyStep::keepWhatMoves(double* onPlaces) {
+    project(onPlaces);
+}
+
+void BodyStep::keepWhatMoves(float* onPlaces) {
+    project(onPlaces);
 }
 
 void BodyStep::findMetricTorques() {
@@ -474,7 +539,7 @@ bool BodyStep::isUnfinished(const State& body) const {
     for (int k = 0; k < 6; k++)
         work += forces[k]*body.change[k];
     // What comes after this change is less by the turn, and by the part of the equations that is left out.
-    const double less = min(1.0, sqrt(dot(body.turned, body.turned))+sqrt(dot(body.change+3, body.change+3))+body.pull);
+    const double less = min(1.0, sqrt(dot(body.turned, body.turned))+sqrt(dot(body.change+3, body.change+3)));
     return !(work*less*less < LEAST_WORK*max(settings.kT, COLD));
 }
 
@@ -489,6 +554,8 @@ void BodyStep::makeChange(State& body, const ShareOfChange& share) const {
     const double part = min(share.part, angle > most ? most/angle : 1);
     for (double& component : turn)
         component *= part;
+    copy_n(turn, 3, body.lastTurn);
+    body.before = body.now;
     // Half a turn or more is told by findExcessiveChanges().
     GibbsVector::follow(turn, body.turned);
     GibbsVector::turn(body.turned, body.start, body.now);

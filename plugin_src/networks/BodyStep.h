@@ -42,6 +42,11 @@ public:
     void eliminate(const CouplingTerm* terms, int numTerms, double* moves) override;
     void respond(const double* forces, double* moves) override;
     void respond(const float* forces, float* moves) override;
+    bool mayMoveTogether() const override {
+        return true;
+    }
+    void keepWhatMoves(double* forces) override;
+    void keepWhatMoves(float* forces) override;
     void findCompliances(double* compliances) override;
     bool needsJointStiffness() const override {
         return settings.kT > 0;
@@ -69,15 +74,24 @@ private:
         double rotationalFriction[6];
         /** Of the equations of an iteration: their matrix and its inverse, and the motion and the turn they lead to. */
         double matrix[36], inverse[36], change[6];
-        /** Whether a coupling holds the body off its centre, and how large what pulls there is against the rest. */
+        /** Whether a coupling holds the body off its centre. */
         bool held;
-        double pull;
+        /** Products of the forces of couplings with their places, in the way of moments: see findPulls(). */
+        double pulls[9];
+        /** The frame before the last iteration, and by what that has turned it. */
+        RigidFrame before;
+        double lastTurn[3];
+        /** The inverse of the sum of STS, see keepWhatMoves(). */
+        double projection[36];
     };
     void describeFlow(const RigidBody& own, State& body) const;
     void drawNoise();
     void sumForces(const RigidBody& own, const double* forces, State& body) const;
     void findFriction(const RigidBody& own, State& body) const;
     void findMetricTorques();
+    void findProjections();
+    void findPulls();
+    template <class Number> void project(Number* onPlaces);
     void setRight(const RigidBody& own, const State& body, double* right) const;
     void turnFreely(const RigidBody& own, State& body) const;
     void findArms();
@@ -95,8 +109,8 @@ private:
     std::vector<int> going;
     /** Places whose stiffness is known, as terms; nothing else is of them. */
     std::vector<CouplingTerm> joints;
-    /** Where the place of each term is against the centre now, and half-way. */
-    std::vector<double> arms, meanArms;
+    /** Where the place of each term is against the centre now. */
+    std::vector<double> arms;
     /** Six numbers for each body. */
     std::vector<double> right;
     const double* positions = nullptr;

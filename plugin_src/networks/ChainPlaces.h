@@ -104,6 +104,10 @@ public:
     bool isBeam(int chain) const {
         return !isStraight(chain) && chain < getNumFilaments();
     }
+    /** Whether it is one of beam elements, or a rigid body: links there turn something. */
+    bool isBeamOrBody(int chain) const {
+        return isBeam(chain) || isBody(chain);
+    }
     /** A chain of beam elements, by its number among all chains. */
     const BeamChain& getBeam(int chain) const {
         return beams[chain-chains.size()];

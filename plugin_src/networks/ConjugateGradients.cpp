@@ -93,6 +93,9 @@ template <class Real> bool ConjugateGradients<Real>::solve(const vector<PackStep
             if (pack+1 < (int) packs.size() && all.coupled[pack+1])
                 packs[pack+1]->prefetchElimination();
             function(first, last);
+            // Energies do not see what moves nothing, so that it would grow.
+            if (packs[pack]->mayMoveTogether())
+                packs[pack]->keepWhatMoves(&residual[3*first]);
             packs[pack]->respond(&residual[3*first], &response[3*first]);
             sums[pack] = kernel.findEnergy(vectors, first, last);
         });

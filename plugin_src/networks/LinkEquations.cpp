@@ -132,7 +132,7 @@ void LinkEquations::begin(const CoupledStart& start, const Loop& newLoop) {
             const double own = stepSize*state.link->stiffness/state.friction[side];
             if (state.places[1-side].pack >= 0)
                 largestStiffness = max(largestStiffness, own);
-            if (state.turns || twoStages || start.places.isBeam(state.places[side].chain))
+            if (state.turns || twoStages || start.places.isBeamOrBody(state.places[side].chain))
                 demandingStiffness = max(demandingStiffness, own);
             if (state.turns)
                 turningStiffness = max(turningStiffness, own);

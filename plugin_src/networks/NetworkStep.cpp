@@ -263,8 +263,9 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
         return own->needsCompliances();
     });
     CoupledEquations::Demands demands;
-    // Beam elements have double precision alone.
-    demands.single = attempt.settings.precision != Precision::Double && beamEngine.getNumPacks() == 0;
+    // Beam elements and bodies have double precision alone.
+    demands.single = attempt.settings.precision != Precision::Double && beamEngine.getNumPacks() == 0 &&
+            bodies.empty();
     for (const ImplicitCouplings* own : couplings) {
         demands.stiffness = max(demands.stiffness, own->getStiffness());
         demands.demandingStiffness = max(demands.demandingStiffness, own->getDemandingStiffness());
