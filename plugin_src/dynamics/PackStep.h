@@ -49,6 +49,13 @@ public:
     /** Begin a stage, with the number of 0 on. */
     virtual void beginStage(int stage) = 0;
     /**
+     * Take note of the forces on places that the equations of the last iteration had, which know no turns, or that are
+     * known now: three numbers for each term of the next call of eliminate(). Only packs that may move together are
+     * told.
+     */
+    virtual void setExpectedForces(const double*) {
+    }
+    /**
      * Linearise the equations, and solve them as if no coupling joined two places of packs.
      *
      * @param terms  in the order of their nodes; they must not change before advance()

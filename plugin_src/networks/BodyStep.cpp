@@ -200,7 +200,6 @@ void BodyStep::begin(const double* newPositions, const double* forces, const dou
         going.push_back(i);
         body = State();
         body.taken = true;
-        body.before = body.start;
         body.start = body.now = finders[i].find(bodies[i], positions);
         sumForces(bodies[i], forces, body);
         if (settings.flow.present)
@@ -287,7 +286,10 @@ void BodyStep::eliminate(const CouplingTerm* newTerms, int count, double* moves)
         findFriction(bodies[i], body);
     }
     findArms();
-    findPulls();
+    // Those before the first iteration are of another step.
+    for (int i = 0; i < numTerms; i++)
+        if (State& body = states[terms[i].lane]; body.settled)
+            addProducts(expectedForces+3*i, &bodies[terms[i].lane].places[3*terms[i].node], body.pulls);
     findMetricTorques();
     findProjections();
     for (int i : going) {
@@ -335,23 +337,6 @@ void BodyStep::setRight(const RigidBody& own, const State& body, double* result)
     for (int k = 0; k < 3; k++) {
         result[k] = body.force[k]+body.randomForce[k]-own.friction/settings.stepSize*(body.moved[k]-body.drift[k]);
         result[3+k] = 0.5*(before[k]+now[k]+pullsBefore[k]-pullsNow[k])+random[k]-drag[k]+body.metricTorque[k];
-    }
-}
-
-/** Find the forces of couplings, as they would be if the last turn had been a shift: see setRight(). */
-void BodyStep::findPulls() {
-    for (int i = 0; i < numTerms; i++) {
-        State& body = states[terms[i].lane];
-        const double* const place = &bodies[terms[i].lane].places[3*terms[i].node];
-        double before[3], shift[3], force[3];
-        body.before.turn(place, before);
-        cross(body.lastTurn, before, shift);
-        for (int k = 0; k < 3; k++)
-            shift[k] = arms[3*i+k]-before[k]-shift[k];
-        multiply(terms[i].stiffness, shift, force);
-        for (int k = 0; k < 3; k++)
-            force[k] += terms[i].force[k];
-        addProducts(force, place, body.pulls);
     }
 }
 
@@ -554,8 +539,6 @@ void BodyStep::makeChange(State& body, const ShareOfChange& share) const {
     const double part = min(share.part, angle > most ? most/angle : 1);
     for (double& component : turn)
         component *= part;
-    copy_n(turn, 3, body.lastTurn);
-    body.before = body.now;
     // Half a turn or more is told by findExcessiveChanges().
     GibbsVector::follow(turn, body.turned);
     GibbsVector::turn(body.turned, body.start, body.now);

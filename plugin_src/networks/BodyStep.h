@@ -39,6 +39,9 @@ public:
     }
     void beginStage(int) override {
     }
+    void setExpectedForces(const double* forces) override {
+        expectedForces = forces;
+    }
     void eliminate(const CouplingTerm* terms, int numTerms, double* moves) override;
     void respond(const double* forces, double* moves) override;
     void respond(const float* forces, float* moves) override;
@@ -76,11 +79,8 @@ private:
         double matrix[36], inverse[36], change[6];
         /** Whether a coupling holds the body off its centre. */
         bool held;
-        /** Products of the forces of couplings with their places, in the way of moments: see findPulls(). */
+        /** Products of the forces of couplings that are expected with their places, in the way of moments. */
         double pulls[9];
-        /** The frame before the last iteration, and by what that has turned it. */
-        RigidFrame before;
-        double lastTurn[3];
         /** The inverse of the sum of STS, see keepWhatMoves(). */
         double projection[36];
     };
@@ -90,7 +90,6 @@ private:
     void findFriction(const RigidBody& own, State& body) const;
     void findMetricTorques();
     void findProjections();
-    void findPulls();
     template <class Number> void project(Number* onPlaces);
     void setRight(const RigidBody& own, const State& body, double* right) const;
     void turnFreely(const RigidBody& own, State& body) const;
@@ -113,7 +112,7 @@ private:
     std::vector<double> arms;
     /** Six numbers for each body. */
     std::vector<double> right;
-    const double* positions = nullptr;
+    const double *positions = nullptr, *expectedForces = nullptr;
     const CouplingTerm* terms = nullptr;
     int numTerms = 0;
 };

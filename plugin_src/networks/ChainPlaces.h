@@ -104,9 +104,8 @@ public:
     bool isBeam(int chain) const {
         return !isStraight(chain) && chain < getNumFilaments();
     }
-    /** Whether it is one of beam elements, or a rigid body: links there turn something. */
-    bool isBeamOrBody(int chain) const {
-        return isBeam(chain) || isBody(chain);
+    bool isBody(int chain) const {
+        return chain >= getNumFilaments() && chain < getFirstParticle();
     }
     /** A chain of beam elements, by its number among all chains. */
     const BeamChain& getBeam(int chain) const {
@@ -130,9 +129,6 @@ private:
     }
     const CoupledParticle& particleOf(int chain) const {
         return particles[chain-getFirstParticle()];
-    }
-    bool isBody(int chain) const {
-        return chain >= getNumFilaments() && chain < getFirstParticle();
     }
     const RigidBody& bodyOf(int chain) const {
         return bodies[chain-getNumFilaments()];

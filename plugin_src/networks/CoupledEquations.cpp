@@ -38,7 +38,7 @@ const int CHUNK_OF_EQUATIONS = 256;
 } // namespace
 
 /** Whether an equation holds its places. */
-static bool isStiff(const CouplingEquation& equation) {
+template <class Equation> static bool isStiff(const Equation& equation) {
     return equation.stiffness[0] != 0 || equation.stiffness[3] != 0 || equation.stiffness[5] != 0;
 }
 
@@ -109,9 +109,10 @@ void CoupledEquations::sortPlaces(const vector<CouplingEquation>& equations, con
     }
 }
 
-void CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, const PackFlags& active,
+bool CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, const PackFlags& active,
             const Loop& loop) {
-    if (!hasSamePlaces(equations, active, loop))
+    const bool areSame = hasSamePlaces(equations, active, loop);
+    if (!areSame)
         sortPlaces(equations, active);
     runInChunks(loop, termOf.size(), CHUNK_OF_EQUATIONS, [&] (int number) {
         if (number+AHEAD < (int) termOf.size() && termOf[number+AHEAD] >= 0)
@@ -130,6 +131,35 @@ void CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, co
             term.force[k] = side == 0 ? equations[i].force[k] : -equations[i].force[k];
         copy(equations[i].stiffness, equations[i].stiffness+6, term.stiffness);
     });
+    return areSame;
+}
+
+/** Tell packs that may move together the forces that the last iteration has found, or those of now. */
+void CoupledEquations::tellForces(const vector<PackStep*>& packs, bool areSame) {
+    const size_t size = 3*gathered.terms.size();
+    const bool known = areSame && expected.size() == size;
+    expected.resize(size);
+    for (size_t pack = 0; pack < packs.size(); pack++) {
+        if (!packs[pack]->mayMoveTogether())
+            continue;
+        for (int i = gathered.first[pack]; i < gathered.first[pack]+gathered.count[pack]; i++)
+            if (!known || !isStiff(gathered.terms[i]))
+                copy_n(gathered.terms[i].force, 3, &expected[3*i]);
+        packs[pack]->setExpectedForces(expected.data()+3*gathered.first[pack]);
+    }
+}
+
+/** Find the forces on places of packs that may move together, as they are after the last changes without turns. */
+void CoupledEquations::noteForces() {
+    for (size_t number = 0; number < termOf.size(); number++) {
+        const int term = termOf[number];
+        if (term < 0)
+            continue;
+        double pull[3];
+        multiply(gathered.terms[term].stiffness, &moves[3*(number/2)], pull);
+        for (int k = 0; k < 3; k++)
+            expected[3*term+k] = gathered.terms[term].force[k]-(number%2 == 0 ? pull[k] : -pull[k]);
+    }
 }
 
 /** Find the forces on places that make up for what joins them, where they move so without; false if single precision
@@ -188,7 +218,14 @@ bool CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
     const bool stiff = demands.demandingStiffness > STIFF;
     tighter = min({demands.forTensions ? OF_TENSIONS : 1, stiff ? OF_STIFF/demands.demandingStiffness : 1,
             OF_STIFF/max(OF_STIFF, demands.stiffness)});
-    gatherTerms(equations, active, loop);
+    const bool areSame = gatherTerms(equations, active, loop);
+    const bool mayMoveTogether = any_of(packs.begin(), packs.end(), [] (const PackStep* pack) {
+        return pack->mayMoveTogether();
+    });
+    if (mayMoveTogether)
+        tellForces(packs, areSame);
+    else
+        expected.clear();
     loop(numPacks, [&] (int pack) {
         if (pack+1 < numPacks && active[pack+1])
             packs[pack+1]->prefetchStart();
@@ -248,6 +285,8 @@ void CoupledEquations::advance(const vector<PackStep*>& packs, const PackFlags& 
                     change.data()+first);
     });
     findMoves(0, change, moves, loop);
+    if (!expected.empty())
+        noteForces();
 }
 
 void CoupledEquations::findCompliancesOfTerms(const vector<PackStep*>& packs, const Loop& loop) {

@@ -110,7 +110,8 @@ public:
 private:
     bool hasSamePlaces(const std::vector<CouplingEquation>& equations, const PackFlags& active, const Loop& loop);
     void sortPlaces(const std::vector<CouplingEquation>& equations, const PackFlags& active);
-    void gatherTerms(const std::vector<CouplingEquation>& equations, const PackFlags& active,
+    /** @return whether the terms are those of the last iteration */
+    bool gatherTerms(const std::vector<CouplingEquation>& equations, const PackFlags& active,
             const Loop& loop);
     bool findForces(const std::vector<PackStep*>& packs, const Demands& demands, const std::vector<double>& ofPlaces,
             std::vector<double>& forces, const Loop& loop);
@@ -118,6 +119,8 @@ private:
             std::vector<double>& ofPlaces, const Loop& loop) const;
     void findMoves(std::size_t first, const std::vector<double>& ofPlaces, std::vector<double>& result,
             const Loop& loop) const;
+    void noteForces();
+    void tellForces(const std::vector<PackStep*>& packs, bool areSame);
     void findCompliancesOfTerms(const std::vector<PackStep*>& packs, const Loop& loop);
     /** One for each place on a chain. */
     CoupledTerms gathered;
@@ -137,6 +140,8 @@ private:
     ConjugateGradients<float> single;
     ConjugateGradients<double> twice;
     std::vector<double> moves, pushedMoves, compliancesOfTerms, jointStiffness;
+    /** For packs that may move together, three numbers for each term: see PackStep::setExpectedForces(). */
+    std::vector<double> expected;
     std::vector<int> firstOfPack, firstOfNode;
     int iterations = 0;
 };

@@ -132,7 +132,11 @@ void LinkEquations::begin(const CoupledStart& start, const Loop& newLoop) {
             const double own = stepSize*state.link->stiffness/state.friction[side];
             if (state.places[1-side].pack >= 0)
                 largestStiffness = max(largestStiffness, own);
-            if (state.turns || twoStages || start.places.isBeamOrBody(state.places[side].chain))
+            // All links of a body hold it together.
+            if (start.places.isBody(state.places[side].chain))
+                demandingStiffness = max(demandingStiffness,
+                        stepSize*stiffness[state.particles[side]]/state.friction[side]);
+            if (state.turns || twoStages || start.places.isBeam(state.places[side].chain))
                 demandingStiffness = max(demandingStiffness, own);
             if (state.turns)
                 turningStiffness = max(turningStiffness, own);
