@@ -29,6 +29,7 @@ _LENGTHS = 9
 _RANGES = ("range", "position_range", "positions", "position_ends", "translation")
 _PLACEMENT = ("orientation", "direction", "position", "reference", "placement", *_RANGES)
 _OFF_PLACE = ("off", "outside", "surface")
+_PARTS, _MOST_PARTS = 20, 2000
 _MOST_SEGMENTS = 5_000_000
 
 
@@ -231,6 +232,8 @@ def _finish(translation, table, fiber, length, whole, count, growing):
     if growing is None:
         return
     growing.length += count * length
+    if any(key == "severing_rate" for key, *_ in growing.entries):
+        table.add("reserve", min(_MOST_PARTS, _PARTS * count), Note(NEAREST, "places for parts of those that are cut"))
     add_growth(translation, "filament", table, fiber, max(length, whole), growing)
 
 
