@@ -106,8 +106,8 @@ def find_cutting(script, fiber):
     for kind in ("single", "couple"):
         for new in (new for new in script.created if new.kind == kind):
             for key in ("hand", "hand1", "hand2"):
-                hand = script.properties.get(script.properties[new.name].settings.text(key, default=""))
-                if hand is None or hand.settings.text("activity") != "cut":
+                hand = script.properties.get(script.properties[new.name].settings.peek(key))
+                if hand is None or hand.settings.peek("activity") != "cut":
                     continue
                 if hand.settings.number("cutting_rate", default=0.0) > 0.0 and own & binding_key(
                     hand.settings.number("binding_key", ("binding", 2))
