@@ -1,10 +1,10 @@
-"""A contractile bundle with turnover: motors contract it for good only if its filaments come and go.
+"""A bundle with turnover: motors contract it for good if its filaments come and go, else until it is a cluster.
 
-Actin filaments of both polarities lie in a tube. Motors walk towards plus ends, stay there, and so pull plus ends
-together; crosslinkers hold filaments, bind and unbind. Filaments that keep their monomers contract into clusters, and
-then nothing moves any more. With turnover, new filaments begin anywhere in the tube, grow until they are capped, are
-cut, and lose monomers at their minus ends until they vanish; all share a pool of monomers. Then the bundle stays as
-long as it was, and what it is made of flows together everywhere, and goes on to do so. Rates are faster than those of
+Actin filaments of both polarities lie in a tube with closed ends. Motors walk towards plus ends, stay there, and so
+pull plus ends together; crosslinkers hold filaments, bind and unbind. Filaments that keep their monomers contract into
+a cluster, and then nothing moves any more. With turnover, new filaments begin anywhere in the tube, grow until they are
+capped, are cut, and lose monomers at their minus ends until they vanish; all share a pool of monomers. Then the bundle
+stays as long as the tube, and what it is made of flows together, and goes on to do so. Rates are faster than those of
 actin in cells, for a short example. Filaments pass through each other here.
 
     python turnover_bundle.py [folder] [steps]
@@ -35,17 +35,18 @@ from openmm_cylchain import (
     Monomers,
     Nucleation,
     Severing,
+    Slab,
     filament_wall_force,
 )
 
 FILAMENTS, SEGMENTS, PLACES = 48, 7, 96
 MONOMER, MONOMERS = 2.7, 40  # nm, and how many a segment has
-LENGTH, RADIUS = 4000.0, 90.0  # nm, of the bundle at first and of the tube
+LENGTH, RADIUS = 4000.0, 90.0  # nm, of the tube
 PLUS, MINUS = 400.0, 100.0  # nm/s, by which plus ends grow at first, and minus ends shrink
-CAPPING, SEVERING, NUCLEATION = 0.4, 0.02, 5.0  # per second; per um and second; per second
-MOTORS, CROSSLINKERS = 150, 150
+CAPPING, SEVERING, NUCLEATION = 0.4, 0.02, 6.0  # per second; per um and second; per second
+MOTORS, CROSSLINKERS = 200, 150
 STEP = 1 * unit.millisecond
-STEPS = 40000
+STEPS = 30000
 FRAMES = 100
 VISCOSITY = 0.1 * unit.pascal * unit.second
 TEMPERATURE = 298.15 * unit.kelvin
@@ -108,8 +109,8 @@ def bundle(growth):
     for kind, count in linkers():
         filaments.add_linkers(kind, count, volume=np.pi * RADIUS**2 * LENGTH, bound=count)
     topology, system, positions = filaments.build()
-    tube = Cylinder([0, 0, 0], [1, 0, 0], RADIUS)
-    system.addForce(filament_wall_force(filaments, system, tube, 0.1 * piconewton / unit.nanometer))
+    for wall in (Cylinder([0, 0, 0], [1, 0, 0], RADIUS), Slab([0, 0, 0], [1, 0, 0], LENGTH)):
+        system.addForce(filament_wall_force(filaments, system, wall, 0.1 * piconewton / unit.nanometer))
     integrator = filaments.create_integrator(system, STEP, random_seed=1, checks=False)
     simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatformByName("CPU"))
     simulation.context.setPositions(positions)
@@ -194,7 +195,7 @@ print(
 
 figure = plt.figure(figsize=(12, 8), layout="constrained")
 grid = figure.add_gridspec(3, 2, height_ratios=(0.8, 0.8, 2.2))
-widest, of_signs = 0.6 * LENGTH / 1000, {1: "#0072B2", -1: "#D55E00"}
+widest, of_signs = 0.54 * LENGTH / 1000, {1: "#0072B2", -1: "#D55E00"}
 for row, name in enumerate(RUNS):
     axes = figure.add_subplot(grid[row, :])
     for points in shapes[name]:
