@@ -195,4 +195,6 @@ def test_random_orientations_begin_anywhere():
     integrator.step(300)
     found = positions_of(context)[indices]
     shapes = np.linalg.norm(found[:, :, None] - found[:, None], axis=-1)
-    assert shapes == pytest.approx(np.linalg.norm(body.points[:, None] - body.points[None], axis=-1)[None].repeat(20, 0))
+    assert shapes == pytest.approx(
+        np.linalg.norm(body.points[:, None] - body.points[None], axis=-1)[None].repeat(20, 0)
+    )
