@@ -51,7 +51,7 @@ class BuiltSystem:
 
 
 @located_errors
-def build_system(configuration, engine, seed, kinetics=True):
+def build_system(configuration, engine, seed, kinetics=True, begun=None):
     """The System of a configuration.
 
     Parameters
@@ -61,12 +61,14 @@ def build_system(configuration, engine, seed, kinetics=True):
         Of random places and shapes.
     kinetics : bool
         Whether to have linkers, and monomers that come and go.
+    begun : Filaments, optional
+        Whose initial positions are taken, in the place of drawn ones.
 
     Returns
     -------
     BuiltSystem
     """
-    filaments = place_filaments(configuration, engine, seed, kinetics)
+    filaments = place_filaments(configuration, engine, seed, kinetics, begun)
     topology, system, positions = filaments.build(box_vectors(configuration.box))
     positions, spheres, radii, friction = _add_particles(configuration, seed, topology, system, positions)
     count = add_links(configuration, filaments, system, seed)
@@ -129,7 +131,7 @@ def recommended_step(configuration, scheme, engine, seed, built=None):
     return built.filaments.recommended_time_step(scheme, system=built.system, **built.arguments())
 
 
-def place_filaments(configuration, engine, seed, kinetics=True):
+def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
     """Filaments with their initial positions, tethers and linkers.
 
     Filaments without a position are laid out side by side on a grid in the xy plane, centred on the origin, for the eye
@@ -140,6 +142,8 @@ def place_filaments(configuration, engine, seed, kinetics=True):
     Parameters
     ----------
     engine : {"compiled", "portable"} or None
+    begun : Filaments, optional
+        Whose positions are taken.
 
     Returns
     -------
@@ -162,6 +166,9 @@ def place_filaments(configuration, engine, seed, kinetics=True):
         for index in range(group.count):
             progress.one_is_done()
             number = len(filaments)
+            if begun is not None:
+                _add(filaments, group, begun[number].positions, begun[number].control_points, kinetics)
+                continue
             places = np.random.default_rng([seed, number, 1])
             own = group, index, solvent.temperature, seed, number, places, box, centers
             nodes, control_points = _nodes(*own, planar if group.planar else None)

@@ -300,13 +300,13 @@ def _random_anchors(entries, seed, box, walls):
         lower, upper = (0.0, 0.0, 0.0) if lower is None else lower, box if upper is None else upper
     if wall is None:
         entries.require("lower", "upper")
-    elif wall > len(walls):
+    elif wall - 1 not in (numbered := {own.number: own for own in walls}):
         raise entries.at("wall").error(f"is {wall}, but there are {len(walls)} [[wall]] tables.")
     if lower is not None and upper is not None and np.any(np.array(lower) > np.array(upper)):
         raise entries.at("upper").error("must not be below lower.")
     if wall is None:
         return np.random.default_rng(seed).uniform(lower, upper, (entries["count"], 3))
     try:
-        return random_points_on(walls[wall - 1].shape, entries["count"], seed, lower, upper)
+        return random_points_on(numbered[wall - 1].shape, entries["count"], seed, lower, upper)
     except InputError as error:
         raise entries.error(f"at random places: {error}") from None
