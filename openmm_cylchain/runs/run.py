@@ -9,7 +9,6 @@ import openmm
 from openmm import unit
 
 from ..couplings.crosslink_records import CrosslinkFile
-from ..couplings.crosslinks import Crosslinks
 from ..couplings.force_tables import ForceTables
 from ..couplings.mean_forces import contact_forces, wall_forces
 from ..engines.description import describe_lengths, filament_label
@@ -100,12 +99,12 @@ def run(configuration, output, resume=False):
             describe(configuration, built.filaments, simulation.system, simulation.topology).write(
                 directory.description
             )
-            _write_crosslinks(directory, simulation)
+            _write_crosslinks(directory, simulation, stages)
         else:
             stage = stage_at(stages, checkpoint.step)
             current = first if stage.number == 0 else stage_simulation(stage, first)
             _restore(current[0].context, checkpoint, current[1].filaments.engine)
-            _check_crosslinks(directory, current[0], checkpoint.step)
+            _check_crosslinks(directory, current[0], stages, checkpoint.step)
             where = f" in {stage.name}" if stage.name else ""
             print(f"Resuming at step {checkpoint.step}, {format_time(stage.time(checkpoint.step))}{where}.")
         try:
@@ -136,7 +135,7 @@ def _run_stages(stages, stage, first, current, directory, checkpoint, signals, p
         stage, before = stages[stage.number + 1], current
         current = stage_simulation(stage, first)
         carry_over(before, current, stage, seed)
-        _go_on_with_crosslinks(directory, current[0], stage.first_step)
+        _write_crosslinks(directory, current[0], stages, stage.first_step)
 
 
 def check_stages(stages):
@@ -211,24 +210,18 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
     return check
 
 
-def _write_crosslinks(directory, simulation):
-    # Those of a configuration stay as they are.
-    if Crosslinks.from_system(simulation.system):
-        with contextlib.closing(CrosslinkFile(directory.crosslinks, simulation.system)) as file:
-            file.write(simulation.context, 0)
+def _write_crosslinks(directory, simulation, stages, step=None):
+    # Those of a stage stay as they are; from a step on, they follow those that are there.
+    if any(own.configuration.links for own in stages):
+        file = CrosslinkFile(directory.crosslinks, simulation.system, step is not None, step or 0)
+        with contextlib.closing(file):
+            # The frame of the step is that of the stage before.
+            file.write(simulation.context, 0 if step is None else step + 1)
             file.synchronise()
 
 
-def _go_on_with_crosslinks(directory, simulation, step):
-    # Those of a stage, if they are others.
-    if Crosslinks.from_system(simulation.system):
-        with contextlib.closing(CrosslinkFile(directory.crosslinks, simulation.system, True, step - 1)) as file:
-            file.write(simulation.context, step)
-            file.synchronise()
-
-
-def _check_crosslinks(directory, simulation, step):
-    if Crosslinks.from_system(simulation.system):
+def _check_crosslinks(directory, simulation, stages, step):
+    if any(own.configuration.links for own in stages):
         CrosslinkFile(directory.crosslinks, simulation.system, append=True, step=step).close()
 
 

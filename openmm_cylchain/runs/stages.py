@@ -243,9 +243,14 @@ def _in_stage(error, leaf, changes):
             return ConfigurationError(f"{leaf.place.name} {error}", (*place.path, *rest))
     if isinstance(error, UnknownKeyError) or not changes.origins:
         return error
-    touched = [place for path, place in changes.origins.items() if path[: len(error.path)] == error.path]
-    path = touched[0].path if len(touched) == 1 else leaf.place.path
-    return ConfigurationError(f"{leaf.place.name} {error}", path if error.path else leaf.place.path)
+    # What the stage has set of the same table, or within it.
+    path = leaf.place.path
+    for table in (error.path, error.path[:-1]):
+        touched = [place.path for own, place in changes.origins.items() if table and own[: len(table)] == table]
+        if touched:
+            path = touched[0]
+            break
+    return ConfigurationError(f"{leaf.place.name} {error}", path)
 
 
 def _refuse_other_structure(first, other, leaf):
