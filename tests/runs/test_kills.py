@@ -67,7 +67,7 @@ def started(processes, configuration, output):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "steps", "files"),
-    [(NETWORK, 1600, FILES), (GROWING, 1000, FILES + OF_GROWING), (STAGED, 1920, FILES + OF_STAGES)],
+    [(NETWORK, 1600, FILES), (GROWING, 1000, FILES + OF_GROWING), (STAGED, 1680, FILES + OF_STAGES)],
     ids=["linked", "growing", "staged"],
 )
 def test_network_that_is_killed_at_random_moments(text, steps, files, tmp_path, processes):
