@@ -1,7 +1,7 @@
-"""What a configuration of Cytosim does: its commands, followed one after the other until the run that is translated.
+"""What a configuration of Cytosim does: its commands, followed one after the other up to each of its runs.
 
-A run of ours goes on with one set of values. Where there are several runs, and something changes between them, the
-longest is taken, with all that is there when it begins.
+Runs between which values change, or linkers come and go, are stages of one run of ours. Filaments do not come, go or
+are cut between stages: runs between which they do are of different parts, of which the longest is taken.
 """
 
 import math
@@ -20,7 +20,9 @@ KINDS = (*KINDS, "nucleus", "fake", "organizer")
 """Classes of objects, apart from simul."""
 
 _WITHOUT_EFFECT = ("report", "write", "export", "save", "mark", "call", "dump", "print")
-_STATES = ("cut", "delete", "move", "import", "load", "equilibrate", "change")
+_STATES = ("cut", "move", "import", "load", "equilibrate")
+_SOLVE = "solve"
+FILAMENTS_CHANGE = "stages: filaments that come, go or are cut"
 _MOST_COMMANDS, _MOST_FILES = 200_000, 10
 _BRACKETED = re.compile(r"\[([^\[\]]*)\]")
 _RANGE = re.compile(r"([A-Za-z_]\w*)=(-?\d+):(-?\d+)(?::(-?\d+))?")
@@ -49,9 +51,11 @@ class New:
 
 @dataclass
 class Script:
-    """What is there when the run that is translated begins: properties by their names, and objects in their order.
+    """What is there when a run begins: properties by their names, and objects in their order.
 
-    ``stages`` are (line, sentence) of what happens between runs, ``choices`` those of what was chosen in a template.
+    ``later`` are the Scripts of the runs that follow, as stages of one run; ``stages`` are (line, sentence, what it
+    needs) of what is left out of others, ``choices`` (line, sentence) of what was chosen in a template. ``broken`` is
+    (line, sentence) of what has happened to filaments since the run before.
     """
 
     simul: Settings = field(default_factory=lambda: Settings("simul", 1))
@@ -61,6 +65,17 @@ class Script:
     steps: int = 0
     stages: list = field(default_factory=list)
     choices: list = field(default_factory=list)
+    later: list = field(default_factory=list)
+    broken: list = field(default_factory=list)
+    frames: int = 0
+    broken_before: list = field(default_factory=list)
+    notes_all: list = field(default_factory=list)
+    notes_between: list = field(default_factory=list)
+
+    @property
+    def duration(self):
+        """Of this run and those that follow, in s."""
+        return sum(max(1, own.steps) * own.time_step for own in (self, *self.later))
 
     def named(self, name, kind, line):
         """A Property of a class, by its name. ScriptError if there is none."""
@@ -89,7 +104,7 @@ def read_script(path, given=None):
         raise ScriptError(1, 'this is no configuration of Cytosim: it has no "set", such as set simul system { ... }')
     whole = _Follower(Path(path).parent)
     whole.follow(commands)
-    script = whole.up_to_longest()
+    script = whole.script()
     script.choices = choices
     return script
 
@@ -129,35 +144,59 @@ class _Follower:
                 return False
         return True
 
-    def up_to_longest(self):
-        """The Script when the longest run begins, or at the end of a file without runs."""
-        script, runs = Script(), []
-        # Runs between which nothing happens are one.
-        for number, (line, what, action) in enumerate(self._actions):
-            if what == "run":
-                settings, steps = action(script)
-                if runs and not runs[-1]["between"]:
-                    runs[-1]["steps"] += steps
-                else:
-                    runs.append({"number": number, "steps": steps, "line": line, "between": []})
-                runs[-1]["settings"] = settings
-                continue
-            if what and runs:
-                runs[-1]["between"].append((line, what))
-            action(script)
+    def script(self):
+        """The Script of the first run of the longest part; or at the end of a file without runs."""
+        runs = self._runs()
         if not runs:
-            return script
-        longest = max(runs, key=lambda run: run["steps"])
-        script = Script(run=longest["settings"], steps=longest["steps"])
-        for _, what, action in self._actions[: longest["number"]]:
+            return self._replayed(len(self._actions))
+        parts = [[]]
+        for index, own in enumerate(runs):
+            if index and own.broken:
+                parts.append([])
+            parts[-1].append(own)
+        chosen = max(parts, key=lambda part: sum(own.steps for own in part))
+        first = chosen[0]
+        first.later = chosen[1:]
+        for part in parts:
+            if part is not chosen:
+                what = part[0].broken or [(part[0].run.line, "what comes behind it")]
+                text = f"a run of {sum(own.steps for own in part)} steps, apart by {what[0][1]}"
+                first.stages.append((part[0].run.line, text, FILAMENTS_CHANGE))
+        first.stages += [own for run in chosen for own in run.notes_between]
+        return first
+
+    def _runs(self):
+        # Scripts of runs; runs between which nothing happens are one.
+        places, last = [], None
+        for number, (_, what, _) in enumerate(self._actions):
+            if what == "run":
+                places.append((number, last is not None and not any(self._changes(last, number))))
+                last = number
+        runs = []
+        for number, follows in places:
+            own = self._replayed(number)
+            own.run, own.steps = self._actions[number][2](own)
+            own.frames = int(own.run.number("nb_frames", default=0.0))
+            before = runs[-1] if runs else None
+            if follows and before is not None and own.run.text(_SOLVE) == before.run.text(_SOLVE):
+                before.steps += own.steps
+                before.frames += own.frames
+                continue
+            own.broken = [] if before is None else [*own.broken[len(before.broken_before) :]]
+            own.notes_between = own.notes_all if before is None else own.notes_all[len(before.notes_all) :]
+            runs.append(own)
+        return [own for own in runs if own.steps > 0] or runs[:1]
+
+    def _changes(self, first, last):
+        return (what for _, what, _ in self._actions[first + 1 : last] if what)
+
+    def _replayed(self, number):
+        script = Script()
+        for _, what, action in self._actions[:number]:
             if what != "run":
                 action(script)
-        if len(runs) > 1:
-            script.stages.append(
-                (longest["line"], f"the run of {longest['steps']} steps is taken of {len(runs)}, all others left out")
-            )
-        for run in runs[:-1]:
-            script.stages += run["between"]
+        script.broken_before, script.notes_all = list(script.broken), list(script.stages)
+        script.stages = []
         return script
 
     def _add(self, command, what, action):
@@ -168,8 +207,42 @@ class _Follower:
         if command.verb in _WITHOUT_EFFECT:
             return True
         if command.verb in _STATES:
-            return self._add(command, f"{command.verb} {' '.join(command.words)}".strip(), lambda script: None)
+            what = f"{command.verb} {' '.join(command.words)}".strip()
+
+            def happen(script):
+                script.broken.append((command.line, what))
+
+            return self._add(command, what, happen)
         raise ScriptError(command.line, f"{command.verb!r} is no command of Cytosim.")
+
+    def _do_delete(self, command):
+        words = [word for word in command.words if word != "all"]
+        count = int(words.pop(0)) if words and words[0].isdigit() else None
+        settings = Settings.of("delete", command.line, command.block)
+        conditions = [key for key in settings._values if key != "nb_objects"]
+        what = f"delete {' '.join(command.words)}"
+
+        def delete(script):
+            name = words[-1] if words else "*"
+            every = [new for new in script.created if name in (new.name, new.kind, "*")]
+            if any(new.kind == "fiber" for new in every):
+                script.broken.append((command.line, what))
+            if conditions:
+                text = f"{what}, by {conditions[0]} = {settings.text(conditions[0])}"
+                if any(new.kind in ("single", "couple") for new in every):
+                    script.stages.append((command.line, text, "stages: linkers that go by where or how they are"))
+                return
+            left = count
+            for new in every:
+                if left is None or isinstance(new.count, str):
+                    script.created.remove(new)
+                    continue
+                gone = min(left, new.count)
+                new.count, left = new.count - gone, left - gone
+                if new.count == 0:
+                    script.created.remove(new)
+
+        return self._add(command, what, delete)
 
     def _do_set(self, command):
         words = [word for word in " ".join(command.words).replace(":", " ").split() if not word.isdigit()]
@@ -209,6 +282,13 @@ class _Follower:
             else:
                 # The one simul has any name.
                 found = [script.simul]
+            # Spaces have their sizes from when they are created.
+            kind, every = (name, None) if whole else ("space", name)
+            found += [
+                own.settings
+                for own in script.created
+                if own.kind == "space" == kind and every in (own.name, None) and not parameter
+            ]
             for settings in found:
                 if parameter:
                     settings.set(parameter[0], [command.block.text.strip()], command.line)
@@ -240,6 +320,8 @@ class _Follower:
             # A count such as [10 * volume] is known with the space.
             count = first if first.startswith("[") else int(first)
             script.created.append(New(count, own, name, settings, command.line))
+            if own == "fiber":
+                script.broken.append((command.line, f"new {' '.join(words)}"))
 
         return self._add(command, f"new {' '.join(words)}", create)
 

@@ -23,6 +23,7 @@ from .simulation import (
     thermal_energy,
 )
 from .spaces import make_space
+from .stages import add_stages
 
 _BODIES = {
     "solid": "bodies: solids",
@@ -57,7 +58,7 @@ class Translation:
     ``start_files`` are arrays of positions in nm by the names of files, which lie beside the configuration.
     """
 
-    def __init__(self, script, title, stem, dimensions=None, folder="."):
+    def __init__(self, script, title, stem, dimensions=None, folder=".", duration=None):
         self._folder = folder
         self.script, self.document, self._stem = script, Document(title), stem
         self.generator = np.random.default_rng(_SEED)
@@ -69,7 +70,8 @@ class Translation:
         self.dimensions = self._find_dimensions(dimensions)
         self.contact_diameter = contact_diameter(script)
         self.steps = max(1, script.steps)
-        self.duration = self.steps * script.time_step
+        self.duration = script.duration if duration is None else duration
+        self._path = stem, dimensions, folder
 
     def left_out(self, text, line, needs):
         """Note what is left out, and what it needs."""
@@ -160,11 +162,23 @@ class Translation:
         return shape == "circle" or (two and shape in _WITH_EVERY_LENGTH)
 
     def translate(self):
-        """Write all of the document."""
+        """Write all of the document, with a stage for each run."""
         for line, text in self.script.choices:
             self.document.note(NEAREST, text, line)
-        for line, text in self.script.stages:
-            self.left_out(text, line, "stages: what changes between runs")
+        for line, text, needs in self.script.stages:
+            self.left_out(text, line, needs)
+        self._translate_run()
+        if self.script.later:
+            stem, dimensions, folder = self._path
+            later = []
+            for script in self.script.later:
+                own = Translation(script, self.document.title, stem, dimensions, folder, self.duration)
+                own._translate_run()
+                later.append(own.document)
+            add_stages(self.document, later, [own.run for own in (self.script, *self.script.later)])
+
+    def _translate_run(self):
+        # What is there when a run begins.
         add_solvent(self)
         self._add_spaces()
         add_box(self)

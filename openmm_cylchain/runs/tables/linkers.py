@@ -27,7 +27,11 @@ _QUANTITIES = {
     "unbinding_force": (units.FORCE, "positive", "Force at which a hand unbinds e times as fast."),
     "catch_rate": (units.RATE, "zero", "Rate of unbinding of a catch bond without a load; loads slow it down."),
     "catch_force": (units.FORCE, "positive", "Force at which a catch bond unbinds e times as slowly."),
-    "speed": (units.VELOCITY, "any", "Speed of walking towards the last node; negative towards the first."),
+    "speed": (
+        units.VELOCITY,
+        "any",
+        "Speed of walking towards the last node; negative towards the first, zero if it stands.",
+    ),
     "stall_force": (units.FORCE, "positive", "Force at which a hand stands still."),
     "site_spacing": (units.LENGTH, "positive", "Distance of binding sites, each of which holds one hand."),
 }
@@ -272,6 +276,9 @@ def _hand(entries, changed):
         at_end = properties["filament_end"]
         with at_end.naming():
             properties["filament_end"] = HandAtEnd(**at_end.given(*_AT_END.names))
+    if properties.get("speed") == 0.0:
+        # One that stands still, as in a stage with a drug, keeps what it has for when it walks.
+        properties.update(stall_force=None, walks_backward=False)
     with entries.naming():
         try:
             return Hand(**properties) if changed is None else dataclasses.replace(changed, **properties)
