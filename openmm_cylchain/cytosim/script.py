@@ -55,7 +55,8 @@ class Script:
 
     ``later`` are the Scripts of the runs that follow, as stages of one run; ``stages`` are (line, sentence, what it
     needs) of what is left out of others, ``choices`` (line, sentence) of what was chosen in a template. ``broken`` is
-    (line, sentence) of what has happened to filaments since the run before.
+    (line, sentence) of what has happened to filaments since the run before, and ``unbound`` which of the hands that are
+    not bound have taken their linkers away since then, by names.
     """
 
     simul: Settings = field(default_factory=lambda: Settings("simul", 1))
@@ -67,10 +68,8 @@ class Script:
     choices: list = field(default_factory=list)
     later: list = field(default_factory=list)
     broken: list = field(default_factory=list)
+    unbound: dict = field(default_factory=dict)
     frames: int = 0
-    broken_before: list = field(default_factory=list)
-    notes_all: list = field(default_factory=list)
-    notes_between: list = field(default_factory=list)
 
     @property
     def duration(self):
@@ -146,46 +145,51 @@ class _Follower:
 
     def script(self):
         """The Script of the first run of the longest part; or at the end of a file without runs."""
-        runs = self._runs()
-        if not runs:
+        parts = self._parts()
+        if not parts:
             return self._replayed(len(self._actions))
-        parts = [[]]
-        for index, own in enumerate(runs):
-            if index and own.broken:
-                parts.append([])
-            parts[-1].append(own)
-        chosen = max(parts, key=lambda part: sum(own.steps for own in part))
-        first = chosen[0]
-        first.later = chosen[1:]
+        chosen = max(parts, key=lambda part: sum(run["steps"] for run in part))
+        scripts, notes, unbound = [], 0, {}
+        for run in chosen:
+            own = self._replayed(run["number"])
+            own.run, own.steps, own.frames = run["settings"], run["steps"], run["frames"]
+            between, notes = own.stages[notes:], len(own.stages)
+            own.stages = between if scripts else []
+            own.unbound, unbound = {k: v for k, v in own.unbound.items() if v != unbound.get(k)}, own.unbound
+            scripts.append(own)
+        first, *first.later = scripts
         for part in parts:
             if part is not chosen:
-                what = part[0].broken or [(part[0].run.line, "what comes behind it")]
-                text = f"a run of {sum(own.steps for own in part)} steps, apart by {what[0][1]}"
-                first.stages.append((part[0].run.line, text, FILAMENTS_CHANGE))
-        first.stages += [own for run in chosen for own in run.notes_between]
+                (line, what), *_ = part[0]["broken"] or [(part[0]["settings"].line, "what comes behind it")]
+                text = f"{sum(run['steps'] for run in part)} steps of other runs, apart by {what}"
+                first.stages.append((line, text, FILAMENTS_CHANGE))
+        first.stages += [note for own in first.later for note in own.stages]
         return first
 
-    def _runs(self):
-        # Scripts of runs; runs between which nothing happens are one.
-        places, last = [], None
-        for number, (_, what, _) in enumerate(self._actions):
-            if what == "run":
-                places.append((number, last is not None and not any(self._changes(last, number))))
-                last = number
-        runs = []
-        for number, follows in places:
-            own = self._replayed(number)
-            own.run, own.steps = self._actions[number][2](own)
-            own.frames = int(own.run.number("nb_frames", default=0.0))
-            before = runs[-1] if runs else None
-            if follows and before is not None and own.run.text(_SOLVE) == before.run.text(_SOLVE):
-                before.steps += own.steps
-                before.frames += own.frames
+    def _parts(self):
+        # Lists of runs, between which filaments come, go or are cut; runs between which nothing happens are one.
+        script, parts, last, known = Script(), [], None, 0
+        for number, (_, what, action) in enumerate(self._actions):
+            if what != "run":
+                action(script)
                 continue
-            own.broken = [] if before is None else [*own.broken[len(before.broken_before) :]]
-            own.notes_between = own.notes_all if before is None else own.notes_all[len(before.notes_all) :]
-            runs.append(own)
-        return [own for own in runs if own.steps > 0] or runs[:1]
+            settings, steps = action(script)
+            frames = int(settings.number("nb_frames", default=0.0))
+            follows = last is not None and not any(self._changes(last, number))
+            last = number
+            before = parts[-1][-1] if parts else None
+            if follows and settings.text(_SOLVE) == before["settings"].text(_SOLVE):
+                before["steps"] += steps
+                before["frames"] += frames
+                continue
+            broken, known = script.broken[known:], len(script.broken)
+            run = {"number": number, "settings": settings, "steps": steps, "frames": frames, "broken": broken}
+            if parts and not broken:
+                parts[-1].append(run)
+            else:
+                parts.append([run])
+        parts = [[run for run in part if run["steps"] > 0] or part[:1] for part in parts]
+        return parts
 
     def _changes(self, first, last):
         return (what for _, what, _ in self._actions[first + 1 : last] if what)
@@ -195,8 +199,6 @@ class _Follower:
         for _, what, action in self._actions[:number]:
             if what != "run":
                 action(script)
-        script.broken_before, script.notes_all = list(script.broken), list(script.stages)
-        script.stages = []
         return script
 
     def _add(self, command, what, action):
@@ -219,14 +221,21 @@ class _Follower:
         words = [word for word in command.words if word != "all"]
         count = int(words.pop(0)) if words and words[0].isdigit() else None
         settings = Settings.of("delete", command.line, command.block)
-        conditions = [key for key in settings._values if key != "nb_objects"]
+        conditions = [key for key in settings._values if key not in ("nb_objects", "mark")]
+        mark = settings.text("mark")
         what = f"delete {' '.join(command.words)}"
 
         def delete(script):
             name = words[-1] if words else "*"
             every = [new for new in script.created if name in (new.name, new.kind, "*")]
+            every = [new for new in every if mark is None or new.settings.text("mark") == mark]
             if any(new.kind == "fiber" for new in every):
                 script.broken.append((command.line, what))
+            if conditions and set(conditions) <= {"state1", "state2"} and count is None:
+                for key in conditions:
+                    if settings.text(key) == "0":
+                        script.unbound.setdefault(name, set()).add(key)
+                return
             if conditions:
                 text = f"{what}, by {conditions[0]} = {settings.text(conditions[0])}"
                 if any(new.kind in ("single", "couple") for new in every):
@@ -284,11 +293,12 @@ class _Follower:
                 found = [script.simul]
             # Spaces have their sizes from when they are created.
             kind, every = (name, None) if whole else ("space", name)
-            found += [
+            spaces = [
                 own.settings
                 for own in script.created
                 if own.kind == "space" == kind and every in (own.name, None) and not parameter
             ]
+            found = spaces or found
             for settings in found:
                 if parameter:
                     settings.set(parameter[0], [command.block.text.strip()], command.line)

@@ -16,10 +16,12 @@ _WITHOUT = {"speed": "0 um/s", "unbinding_force": "1e+06 pN", "stall_force": "1e
 _WITHOUT |= {"walks_backward": False, "same_filament": False, "propulsion": "0 pN"}
 """Values that say the same as none."""
 _NOT_COMPARED = ("duration", "longest", "name", "type", "seed", "platform")
+_PLACES = ("position", "inside", "direction", "orientation", "nodes", "tangents", "file", "start", "height", "normal")
+"""Where filaments begin, which is past in later runs."""
 _NEEDS = "stages: {}"
 
 
-def add_stages(document, later, runs):
+def add_stages(document, later, runs, unbound=()):
     """Make a Document of the first run one of all.
 
     Parameters
@@ -30,6 +32,8 @@ def add_stages(document, later, runs):
         Of the runs that follow.
     runs : list of Settings
         Those of all runs.
+    unbound : list of dict
+        Of later runs: which unbound hands have taken their linkers away before, by names.
     """
     stages = [_plain(own) for own in (document, *later)]
     simulation = document.tables_called("[simulation]")[0]
@@ -51,13 +55,17 @@ def add_stages(document, later, runs):
         table.add("name", f"run {number + 1}")
         table.add("duration", duration, Note(EXACT, f"run {number + 1}", run.line))
         if number:
-            _add_changes(document, stages[number - 1], own, run.line)
+            _add_changes(document, stages[number - 1], own, run.line, unbound[number - 1] if unbound else {})
 
 
 def _plain(document):
     # Dicts by the names of tables: lists of them.
     found = {}
     for table in document.tables:
+        parent, _, inner = table.header.strip("[]").partition(".")
+        if inner:
+            found[parent][-1][inner] = {key: value for key, value, _ in table.entries if key is not None}
+            continue
         values = {key: copy.deepcopy(value) for key, value, _ in table.entries if key is not None}
         found.setdefault(table.header.strip("[]"), []).append(values)
     return found
@@ -74,12 +82,12 @@ def _complete(name, stages, document, later):
     for own, source in zip(stages, (document, *later)):
         there = own.get(name, [])
         for place, table in enumerate(there):
-            known = [index for index, (other, _) in enumerate(order) if _same(other, table, name)]
+            known = [index for index, (other, *_) in enumerate(order) if _same(other, table, name)]
             if (name == "linkers" and not known) or (name != "linkers" and place >= len(order)):
-                order.append((table, source.tables_called(f"[[{name}]]")[place]))
+                order.append((table, source.tables_called(f"[[{name}]]")[place], source))
     for number, own in enumerate(stages):
         there, complete = own.get(name, []), []
-        for index, (table, source) in enumerate(order):
+        for index, (table, source, whose) in enumerate(order):
             mine = [other for other in there if other.get("name") == table.get("name")] if name == "linkers" else []
             mine = mine or (there[index : index + 1] if name != "linkers" else [])
             if mine:
@@ -89,21 +97,35 @@ def _complete(name, stages, document, later):
             absent.pop("bound", None)
             complete.append(absent)
             if number == 0:
-                _write_absent(name, absent, source, document)
+                _write_absent(name, absent, source, whose, document)
         if complete:
             own[name] = complete
 
 
-def _write_absent(name, values, source, document):
+def _inner_tables(document, table):
+    # Those behind a table that belong to it, such as [filament.growth].
+    found = []
+    for own in document.tables[next(i for i, one in enumerate(document.tables) if one is table) + 1 :]:
+        if not own.header.startswith(f"[{table.header.strip('[]')}."):
+            break
+        found.append(own)
+    return found
+
+
+def _write_absent(name, values, source, later, document):
     # Behind the last table of its kind, or before [simulation], as TOML takes them in any order.
     table = copy.copy(source)
     notes = {key: note for key, _, note in source.entries if key is not None}
-    table.entries = [(key, value, notes.get(key)) for key, value in values.items()]
+    inner = _inner_tables(later, source)
+    names = [own.header.strip("[]").partition(".")[2] for own in inner]
+    table.entries = [(key, value, notes.get(key)) for key, value in values.items() if key not in names]
     if name == "linkers" and "anchors" in values:
         table.comment(Note(NEAREST, "its anchors are there from the beginning", source.line))
     same = [index for index, other in enumerate(document.tables) if other.header == source.header]
-    place = same[-1] + 1 if same else len(document.tables) - 1
-    document.tables.insert(place, table)
+    place = len(document.tables) - 1
+    if same:
+        place = same[-1] + 1 + len(_inner_tables(document, document.tables[same[-1]]))
+    document.tables[place:place] = [table, *inner]
 
 
 def _with_two_hands(stages, document):
@@ -128,11 +150,18 @@ def _longest(stages, document):
         for index, table in enumerate(document.tables_called(f"[[{name}]]")):
             growths = [own[name][index].get("growth") for own in stages if index < len(own.get(name, []))]
             lengths = [own["longest"] for own in growths if own is not None and "longest" in own]
-            if lengths and table.value("growth") is not None:
-                table.value("growth")["longest"] = max(lengths, key=lambda text: float(text.split()[0]))
+            if not lengths:
+                continue
+            longest = max(lengths, key=lambda text: float(text.split()[0]))
+            if table.value("growth") is not None:
+                table.value("growth")["longest"] = longest
+            for inner in _inner_tables(document, table):
+                inner.entries = [
+                    (key, longest if key == "longest" else value, note) for key, value, note in inner.entries
+                ]
 
 
-def _add_changes(document, before, after, line):
+def _add_changes(document, before, after, line, unbound):
     for name in dict.fromkeys((*before, *after)):
         if name in ("title", "stage"):
             continue
@@ -148,6 +177,12 @@ def _add_changes(document, before, after, line):
                 change = _change(document, name, first, second, line)
             if name == "linkers":
                 _count_bound(first, second, change)
+                gone = unbound.get(second.get("name"), set()) | unbound.get("couple", set())
+                if gone:
+                    change["keep"] = "both hands bound" if len(gone) == 2 else "bound"
+                    if len(gone) == 1:
+                        text = f"{second['name']} that go if {', '.join(gone)} = 0: here if no hand is bound"
+                        document.note(NEAREST, text, line)
             if change:
                 _add_table(document, f"[stage.{name}.{index + 1}]" if name in _REPEATED else f"[stage.{name}]", change)
 
@@ -170,7 +205,7 @@ def _change(document, name, first, second, line):
     change = {}
     for key in dict.fromkeys((*first, *second)):
         one, other = first.get(key), second.get(key)
-        if one == other or key in _NOT_COMPARED:
+        if one == other or key in _NOT_COMPARED or (name == "filament" and key in _PLACES):
             continue
         if name in CHANGES and key not in CHANGES[name] or key in STAYS.get(name, ()):
             _leave_out(document, f"another {key} of {name}", line, key)

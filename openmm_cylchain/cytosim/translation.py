@@ -175,7 +175,8 @@ class Translation:
                 own = Translation(script, self.document.title, stem, dimensions, folder, self.duration)
                 own._translate_run()
                 later.append(own.document)
-            add_stages(self.document, later, [own.run for own in (self.script, *self.script.later)])
+            unbound = [own.unbound for own in self.script.later]
+            add_stages(self.document, later, [own.run for own in (self.script, *self.script.later)], unbound)
 
     def _translate_run(self):
         # What is there when a run begins.

@@ -12,6 +12,7 @@ import openmm
 from ..errors import InputError
 from ..kinetics.binding_force import find_binding_force
 from ..kinetics.growth_force import find_growth_force
+from .tables.linkers import KEPT
 
 _PARAMETERS = "IntegratorParameters"
 _LINKERS, _GROWTH = "linkers", "growth"
@@ -85,10 +86,15 @@ class _Linkers(_Columns):
         keep, added = np.ones(len(rows["numbers"]), bool), []
         for number, own in enumerate(stage.configuration.linkers):
             mine = np.flatnonzero(rows["types"] == number)
-            held = (rows["chains"][mine] >= 0).any(axis=1) | (rows["anchors"][mine] >= 0)
-            if own.concentration is not None:
-                keep[mine[~held]] = False
-            elif own.anchors is None:
+            if own.anchors is not None:
+                continue
+            hands = (rows["chains"][mine] >= 0).sum(axis=1)
+            least = 0 if stage.is_piece else KEPT.index(own.keep)
+            # Of a concentration, those that are not bound are nobody's.
+            least = max(least, int(own.concentration is not None))
+            keep[mine[hands < least]] = False
+            mine = mine[hands >= least]
+            if number in stage.counted and own.count is not None:
                 excess = len(mine) - own.count
                 if excess > 0:
                     keep[generator.choice(mine, excess, replace=False)] = False

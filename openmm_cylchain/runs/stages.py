@@ -16,6 +16,7 @@ from .table import UnknownKeyError
 from .tables.stages import STAGE
 
 _MOST_STAGES = 10**5
+_AT_THE_BEGINNING = ("bound", "keep")
 _DURATION = ("simulation", "duration")
 
 
@@ -52,8 +53,8 @@ class Stage:
         How many steps and reports come before it, but for that of the start.
     is_piece : bool
         Whether it goes on with a stage that is divided.
-    bound : frozenset of int
-        Numbers of [[linkers]] tables of which those that are added begin bound.
+    counted, bound : frozenset of int
+        Numbers of [[linkers]] tables whose count it gives, and of which those that are added begin bound.
     tethers : tuple of TetherCourse
     """
 
@@ -64,6 +65,7 @@ class Stage:
     first_step: int = 0
     first_report: int = 0
     is_piece: bool = False
+    counted: frozenset = frozenset()
     bound: frozenset = frozenset()
     tethers: tuple = ()
 
@@ -151,7 +153,7 @@ def read_stages(raw, kinds, read):
         raise ConfigurationError(text, _DURATION)
     stages, reset, known = [], [], {}
     for leaf in _leaves(raw[STAGE.name], ("stage",), "", _Count()):
-        changes = apply_stage(_without_bound(tables) if stages else tables, leaf.table, leaf.place, kinds)
+        changes = apply_stage(_as_they_are(tables) if stages else tables, leaf.table, leaf.place, kinds)
         pieces = _pieces(leaf, changes)
         for piece in range(pieces):
             own = changes.resolved((piece + 0.5) / pieces)
@@ -209,11 +211,12 @@ def _pieces(leaf, changes):
     return leaf.entries["pieces"] or 1
 
 
-def _without_bound(tables):
-    # Only those that a stage adds begin bound in it, if it says so.
+def _as_they_are(tables):
+    # What holds for the beginning of a stage alone, of linkers, is said by that stage.
     if not isinstance(tables.get("linkers"), list):
         return tables
-    return {**tables, "linkers": [{key: own[key] for key in own if key != "bound"} for own in tables["linkers"]]}
+    kept = [{key: own[key] for key in own if key not in _AT_THE_BEGINNING} for own in tables["linkers"]]
+    return {**tables, "linkers": kept}
 
 
 def _read_piece(tables, leaf, pieces, changes, read, known):
@@ -281,7 +284,7 @@ def _refuse_other_structure(first, other, leaf):
 
 
 def _next_stage(stages, leaf, configuration, piece, changes):
-    bound = frozenset(path[1] for path in changes.origins if path[0] == "linkers" and path[2] == "bound")
+    bound, counted = (_numbers_of("linkers", name, changes.origins) for name in ("bound", "count"))
     if bound and stages and piece == 0:
         _refuse_bound_on_growing(bound, configuration, leaf)
     if not stages:
@@ -295,8 +298,13 @@ def _next_stage(stages, leaf, configuration, piece, changes):
         first_step=last.last_step,
         first_report=last.first_report + last.reports,
         is_piece=piece > 0,
-        bound=bound if piece == 0 else frozenset(),
+        counted=counted,
+        bound=bound,
     )
+
+
+def _numbers_of(table, name, origins):
+    return frozenset(path[1] for path in origins if path[0] == table and path[2] == name)
 
 
 def _refuse_bound_on_growing(bound, configuration, leaf):

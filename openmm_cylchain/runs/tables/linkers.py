@@ -109,6 +109,8 @@ _AT_END = TableKind(
     owner="filament_end of the hand of [[linkers]]",
 )
 
+KEPT = ("all", "bound", "both hands bound")
+"""Linkers that a stage keeps, by how many of their hands are bound at least."""
 HAND = TableKind(
     "hand",
     (
@@ -166,6 +168,12 @@ LINKERS = TableKind(
         ),
         Key("anchors", _Anchors(), None, "Points to which they are tied, one each, in place of their first hands."),
         Key("bound", Whole(0, 10**7, "100"), 0, "How many begin with one hand bound, at random or near anchors."),
+        Key(
+            "keep",
+            Choice(KEPT),
+            "all",
+            "In a `[[stage]]`, which of those that are there stay as it begins; others go, and come again by count alone.",
+        ),
     ),
     "Crosslinkers or motors that bind to filaments, walk along them and unbind; the page on linkers has their laws.",
     repeated=True,
@@ -182,13 +190,14 @@ class LinkerGroup:
     volume: float | None
     anchors: tuple | None
     bound: int
+    keep: str = "all"
 
 
 def read_linkers(entries, groups, box, seed, walls=()):
     """The LinkerGroup of a [[linkers]] table, for FilamentGroups; the seed is that of anchors at random places."""
     anchors = _anchor_points(entries, sum(own.count * own.nodes for own in groups), seed, box, walls)
     names = ("count", "concentration", "volume")
-    group = LinkerGroup(_kind(entries), *(entries[name] for name in names), anchors, entries["bound"])
+    group = LinkerGroup(_kind(entries), *(entries[name] for name in names), anchors, entries["bound"], entries["keep"])
     with entries.naming():
         as_linkers(group.kind, group.count, group.concentration, group.volume, group.anchors, group.bound, 0)
     if group.count is not None and group.volume is None and (box is None or walls):
