@@ -172,7 +172,7 @@ LINKERS = TableKind(
             "keep",
             Choice(KEPT),
             "all",
-            "In a `[[stage]]`, which of those that are there stay as it begins; others go, and come again by count alone.",
+            "In a `[[stage]]`: which of those that are there stay as it begins. Others go, and come by count alone.",
         ),
     ),
     "Crosslinkers or motors that bind to filaments, walk along them and unbind; the page on linkers has their laws.",
