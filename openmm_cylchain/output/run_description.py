@@ -112,13 +112,17 @@ class DescribedContacts:
 
 @dataclass(frozen=True)
 class DescribedStage:
-    """A stage of a run: its name, when it begins in ps, steps before it, and steps from each frame to the next."""
+    """A stage of a run: its name, when it begins in ps, steps before it, and steps from each frame to the next.
+
+    One with ramps is divided: what follows its first piece ``is_piece``.
+    """
 
     name: str
     begin: float
     first_step: int
     steps_per_frame: int
     frames: int
+    is_piece: bool = False
 
     @property
     def steps(self) -> range:

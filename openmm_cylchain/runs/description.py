@@ -30,7 +30,14 @@ def describe(configuration, filaments, system, topology):
     )
     described = zip(description.filaments, loads_of_filaments(configuration))
     stages = [
-        DescribedStage(own.name, own.begin, own.first_step, own.configuration.simulation.steps_per_report, own.reports)
+        DescribedStage(
+            own.name,
+            own.begin,
+            own.first_step,
+            own.configuration.simulation.steps_per_report,
+            own.reports,
+            own.is_piece,
+        )
         for own in configuration.stages
     ]
     return replace(
