@@ -40,10 +40,10 @@ def reference_page():
 def _changes():
     # Which keys stages may change.
     yield (
-        "Beside these it has tables that change others, by their names, and by the names or numbers of tables where there "
-        "are several: `[stage.linkers.myosin]`, `[stage.wall.2]`, `[stage.wall]` for all walls. A value that goes from one "
-        "to another is `{ from = ..., to = ... }`. `[[stage.stage]]` tables in place of a duration are stages that come one "
-        "after the other, as often as `repeat` says. [Stages](stages.md) has examples.\n"
+        "Beside these it has tables that change others, by their names, and by the names or numbers of tables where "
+        "there are several: `[stage.linkers.myosin]`, `[stage.wall.2]`, `[stage.wall]` for all walls. A value that "
+        "goes from one to another is `{ from = ..., to = ... }`. `[[stage.stage]]` tables in place of a duration are "
+        "stages that come one after the other, as often as `repeat` says. [Stages](stages.md) has examples.\n"
     )
     yield "| table | keys that a stage may change |\n|---|---|"
     headers = {kind.name: kind.header for kind in TABLES}

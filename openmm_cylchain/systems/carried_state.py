@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import openmm
 
-from ..couplings.chain_forces import is_chain_force
+from ..couplings.native_links import is_of_compiled_engine
 from ..errors import InputError
 from ..kinetics.binding_force import find_binding_force
 from ..kinetics.growth_force import find_growth_force
@@ -57,7 +57,7 @@ def carry_state(
         raise InputError(
             f"The System has {counts[1]} particles, but that before has {counts[0]}: it must have as many."
         )
-    compiled = any(map(is_chain_force, after.getSystem().getForces()))
+    compiled = is_of_compiled_engine(after.getSystem())
     state = before.getState(positions=True, integratorParameters=compiled)
     if not compiled:
         after.setPositions(state.getPositions())

@@ -103,6 +103,58 @@ def test_what_a_stage_says_is_there(tmp_path):
     assert np.all(loads["load (pN)"][:17] == 0.0) and loads["mean over (ms)"][20].max() > 0.0
 
 
+WASHED = """
+[[stage]]
+duration = "0.2 ms"
+[[stage]]
+name = "washed"
+duration = "0.1 ms"
+linkers.motor.keep = "both hands bound"
+linkers.1.keep = "bound"
+linkers.1.hand.binding_rate = "0 1/s"
+[[stage]]
+name = "again"
+duration = "0.1 ms"
+linkers.motor.count = 30
+"""
+
+
+def test_a_stage_keeps_bound_linkers_and_none_come_back_by_themselves(tmp_path):
+    """From reports at which a stage begins, when nothing has unbound yet: 5 us later."""
+    text = NETWORK.replace('duration = "1 ms"\n', "checks = false\n").replace('"0.1 ms"', '"5 us"') + WASHED
+    run(parse_configuration(text), tmp_path / "out")
+    table = read_reports(tmp_path / "out" / "linkers.csv")
+    counts = table["unbound"] + table["one hand bound"] + table["both hands bound"]
+    both, bound = table["both hands bound"], table["one hand bound"] + table["both hands bound"]
+    assert both[40, 1] > 10 and bound[40, 0] < 40
+    assert np.all(counts[41:61] == [bound[40, 0], both[40, 1]])
+    assert np.all(counts[61:, 1] == 30) and np.all(counts[61:, 0] == bound[40, 0])
+
+
+def test_concentrations_and_counts_take_turns(tmp_path):
+    text = (
+        NETWORK.replace('duration = "1 ms"\n', "checks = false\n")
+        + """
+[[stage]]
+duration = "0.2 ms"
+[[stage]]
+duration = "0.2 ms"
+linkers.motor.concentration = "1 uM"
+[[stage]]
+duration = "0.2 ms"
+linkers.motor.count = 70
+"""
+    )
+    configuration = parse_configuration(text)
+    assert [own.configuration.linkers[1].count for own in configuration.stages] == [40, None, 70]
+    run(configuration, tmp_path / "out")
+    table = read_reports(tmp_path / "out" / "linkers.csv")
+    bound = table["one hand bound"][:, 1] + table["both hands bound"][:, 1]
+    # Nobody counts those of a concentration that are not bound.
+    assert np.all(np.nan_to_num(table["unbound"][3:5, 1]) == 0.0) and bound[4] > 20
+    assert table["unbound"][5, 1] + bound[5] == 70
+
+
 def test_points_of_tethers_go_on_from_stage_to_stage(tmp_path):
     configuration = parse_configuration(MANY_CHANGES)
     run(configuration, tmp_path / "out")
