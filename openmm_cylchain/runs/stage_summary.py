@@ -121,8 +121,11 @@ def _summarise(first, last, columns):
     return StageSummary(first.name, first.begin / MILLISECOND, last.end / MILLISECOND, values)
 
 
-def mark_stages(axes, configuration):
-    """Draw a line where each stage begins into all panels of a figure that have times, and the names of stages."""
+def mark_stages(axes, configuration, low=None):
+    """Draw a line where each stage begins into all panels of a figure that have times, and the names of stages.
+
+    In the panel ``low``, names are below, because there is a legend above.
+    """
     if not configuration.stages:
         return
     stages = named_stages(configuration)
@@ -139,12 +142,12 @@ def mark_stages(axes, configuration):
             if len(stages) <= _MOST_NAMES:
                 axis.text(
                     first.begin / length,
-                    0.98,
-                    f" {first.name}",
+                    0.02 if axis is low else 0.98,
+                    f" {first.name} ",
                     transform=axis.get_xaxis_transform(),
                     rotation=90,
                     ha="left",
-                    va="top",
+                    va="bottom" if axis is low else "top",
                     fontsize=FONT_SIZE - 2,
                     color="0.35",
                 )

@@ -116,7 +116,7 @@ def _draw(configuration, directory, trajectory, network):
         _draw_tensions(axes[2 + own_row, 1], labels, colours_of_linkers, table)
     if has_forces:
         _draw_forces(axes[-1], configuration, directory, trajectory.time)
-    mark_stages(axes.flat, configuration)
+    mark_stages(axes.flat, configuration, low=axes[1, 1] if network else axes[0, 1])
     for axis in axes.flat:
         axis.title.set_fontsize(FONT_SIZE + 1)
         axis.xaxis.label.set_fontsize(FONT_SIZE)
