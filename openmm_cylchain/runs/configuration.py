@@ -262,7 +262,7 @@ def _read_tables(raw):
                     f"{kind.name!r} must be a table: write {kind.header} once, with its keys below it.", (kind.name,)
                 )
             tables[kind.name] = [kind.read(found, Place(kind.header, (kind.name,)))]
-        if ACTIVE.name in kind.names:
+        if ACTIVE.name in kind.names and kind is not FILAMENT:
             tables[kind.name] = [own for own in tables[kind.name] if own[ACTIVE.name]]
     if not (tables["filament"] or tables["nucleation"]):
         raise InputError("There is no [[filament]] table: add one for every kind of filament.")

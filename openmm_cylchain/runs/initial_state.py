@@ -17,6 +17,7 @@ from ..couplings.pulling import constant_force, constant_tension
 from ..couplings.walls import filament_wall_force, wall_force
 from ..errors import InputError
 from ..filaments import shapes
+from ..filaments.filaments_that_take_part import FilamentsThatTakePart
 from ..filaments.monomers import Monomers
 from ..filaments.segment_place import SegmentPlace
 from ..output.progress import LateMessages, ProgressMessages
@@ -71,14 +72,15 @@ def build_system(configuration, engine, seed, kinetics=True, begun=None):
     filaments = place_filaments(configuration, engine, seed, kinetics, begun)
     topology, system, positions = filaments.build(box_vectors(configuration.box))
     positions, spheres, radii, friction = _add_particles(configuration, seed, topology, system, positions)
+    present = filaments if all(own.takes_part for own in filaments) else FilamentsThatTakePart(filaments)
     count = add_links(configuration, filaments, system, seed)
     _add_joints(configuration, filaments, system)
     tables = configuration.tables
-    if configuration.contacts is not None:
+    if configuration.contacts is not None and len(present):
         own = configuration.contacts
         with tables["contacts"][0].naming():
             force = capsule_contact_force(
-                filaments,
+                present,
                 system,
                 own.diameter,
                 own.stiffness,
@@ -89,7 +91,7 @@ def build_system(configuration, engine, seed, kinetics=True, begun=None):
         system.addForce(force)
     for own, entries in zip(configuration.walls, tables["wall"]):
         with entries.naming():
-            system.addForce(_wall(own, filaments, system, spheres, radii))
+            system.addForce(_wall(own, present, system, spheres, radii))
     for own, entries in zip(configuration.pulls, tables["pull"]):
         with entries.naming():
             system.addForce(_pull(own, filaments))
@@ -176,6 +178,11 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
                 planar.add(number, nodes, group.closed)
             _add(filaments, group, nodes, control_points, kinetics)
     messages.finish()
+    first = 0
+    for group in configuration.filaments:
+        for number in range(first, first + group.count) if not group.active else ():
+            filaments.set_aside(number)
+        first += group.count
     if configuration.contacts is not None:
         for number, filament in enumerate(filaments):
             if not filament.type.segment_kind.straight:

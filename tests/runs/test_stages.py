@@ -155,6 +155,82 @@ linkers.motor.count = 70
     assert table["unbound"][5, 1] + bound[5] == 70
 
 
+COMES_AND_GOES = """
+[solvent]
+temperature = "300 K"
+viscosity = "1 mPa*s"
+[[filament]]
+name = "STAYS"
+diameter = "10 nm"
+segment_length = "100 nm"
+persistence_length = "10 um"
+stretching_modulus = "1 nN"
+segments = 4
+count = 6
+inside = { shape = "sphere", radius = "0.3 um" }
+[[filament]]
+name = "COMES"
+diameter = "10 nm"
+segment_length = "100 nm"
+persistence_length = "10 um"
+stretching_modulus = "1 nN"
+segments = 4
+count = 6
+inside = { shape = "sphere", radius = "0.3 um" }
+active = false
+[[linkers]]
+name = "glue"
+stiffness = "0.1 pN/nm"
+rest_length = "20 nm"
+hand = { binding_rate = "1e5 1/s", reach = "60 nm", unbinding_rate = "100 1/s" }
+count = 60
+volume = "0.1 um^3"
+[[wall]]
+shape = "sphere"
+radius = "0.31 um"
+stiffness = "0.1 pN/nm"
+[contacts]
+diameter = "20 nm"
+[simulation]
+time_step = "0.5 us"
+report_interval = "50 us"
+seed = 4
+checks = false
+[[stage]]
+duration = "0.2 ms"
+[[stage]]
+name = "comes"
+duration = "0.3 ms"
+filament.COMES.active = true
+[[stage]]
+name = "goes"
+duration = "0.2 ms"
+filament.STAYS.active = false
+"""
+
+
+@pytest.mark.filterwarnings("ignore::openmm_cylchain.errors.ContactWarning")
+def test_filaments_come_and_go(tmp_path):
+    """Those that are not active stand still but for their first nodes; nothing binds to them or touches them."""
+    configuration = parse_configuration(COMES_AND_GOES)
+    run(configuration, tmp_path / "out")
+    found = analysis.load(tmp_path / "out")
+    first, second, third = (stage.frames for stage in found.stages)
+    stays, comes = slice(0, 6), slice(6, 12)
+    nodes = np.array([found.nodes(frame) for frame in range(len(found))])[:, :, 1:]
+    moves = np.abs(np.diff(nodes, axis=0)).max(axis=(2, 3)) > 0.0
+    assert np.all(moves[: first.stop - 1, stays]) and not np.any(moves[: first.stop - 1, comes])
+    assert np.all(moves[first.stop : third.start - 1])
+    assert not np.any(moves[third.start - 1 :, stays]) and np.all(moves[third.start :, comes])
+    held = [set(found.linkers[frame]["filaments"].ravel().tolist()) - {-1} for frame in range(len(found))]
+    assert held[first[-1]] and held[first[-1]] <= set(range(6))
+    assert held[second[-1]] & set(range(6, 12))
+    assert held[third[0]] and held[third[-1]] <= set(range(6, 12))
+    loads = read_reports(tmp_path / "out" / "contact_forces.csv")["load (pN)"]
+    assert np.all(loads[: first.stop, comes] == 0.0) and np.all(loads[third.start :, stays] == 0.0)
+    assert loads[second.start :, comes].max() > 0.0
+
+
 def test_points_of_tethers_go_on_from_stage_to_stage(tmp_path):
     configuration = parse_configuration(MANY_CHANGES)
     run(configuration, tmp_path / "out")
@@ -263,6 +339,7 @@ duration = "0.1 ms"
         (ONE + "[stage.filament]\nsegments = 5", "segments = 5", "segments cannot change while a run goes on"),
         (ONE + "[stage.wall]\nradius = '1 um'", "[stage.wall]", "changes a [[wall]] of the file, which has none"),
         (ONE + "[stage.solvents]\ntemperature = '1 K'", "[stage.solvents]", "unknown key 'solvents'"),
+        (ONE + "filament.active = true\nfilament.1.clamped = [0]", "filament.1.clamped", "cannot change while a run"),
         (ONE + "repeat = 0", "repeat", "must be at least 1"),
         (
             ONE + "[stage.solvent]\ntemperature = { from = '300 K', to = '310 K' }",
