@@ -1,7 +1,7 @@
 """What a configuration of Cytosim does: its commands, followed one after the other up to each of its runs.
 
-Runs between which values change, or linkers come and go, are stages of one run of ours. Filaments do not come, go or
-are cut between stages: runs between which they do are of different parts, of which the longest is taken.
+Runs between which values change, linkers come and go, or fibers come are stages of one run of ours. Runs between which
+fibers go, are cut or come and grow are of different parts, of which the longest is taken.
 """
 
 import math
@@ -22,7 +22,7 @@ KINDS = (*KINDS, "nucleus", "fake", "organizer")
 _WITHOUT_EFFECT = ("report", "write", "export", "save", "mark", "call", "dump", "print")
 _STATES = ("cut", "move", "import", "load", "equilibrate")
 _SOLVE = "solve"
-FILAMENTS_CHANGE = "stages: filaments that come, go or are cut"
+FILAMENTS_CHANGE = "stages: filaments that go, are cut, or come and grow"
 _MOST_COMMANDS, _MOST_FILES = 200_000, 10
 _BRACKETED = re.compile(r"\[([^\[\]]*)\]")
 _RANGE = re.compile(r"([A-Za-z_]\w*)=(-?\d+):(-?\d+)(?::(-?\d+))?")
@@ -158,9 +158,10 @@ class _Follower:
             own.unbound, unbound = {k: v for k, v in own.unbound.items() if v != unbound.get(k)}, own.unbound
             scripts.append(own)
         first, *first.later = scripts
-        for part in parts:
+        for number, part in enumerate(parts):
             if part is not chosen:
-                (line, what), *_ = part[0]["broken"] or [(part[0]["settings"].line, "what comes behind it")]
+                # What lies between it and those that are taken.
+                (line, what), *_ = parts[number + (parts.index(chosen) > number)][0]["broken"]
                 text = f"{sum(run['steps'] for run in part)} steps of other runs, apart by {what}"
                 first.stages.append((line, text, FILAMENTS_CHANGE))
         first.stages += [note for own in first.later for note in own.stages]
@@ -330,8 +331,8 @@ class _Follower:
             # A count such as [10 * volume] is known with the space.
             count = first if first.startswith("[") else int(first)
             script.created.append(New(count, own, name, settings, command.line))
-            if own == "fiber":
-                script.broken.append((command.line, f"new {' '.join(words)}"))
+            if own == "fiber" and _grows(script.properties[name], settings):
+                script.broken.append((command.line, f"new {' '.join(words)}, which grows"))
 
         return self._add(command, f"new {' '.join(words)}", create)
 
@@ -395,6 +396,11 @@ class _Follower:
             raise ScriptError(command.line, f"in {command.words[0]}, {error}") from None
 
     _do_include = _do_read
+
+
+def _grows(own, options):
+    # Whether fibers may grow: those cannot come between runs of one part.
+    return own.kind == "fiber" and own.settings.peek("activity") not in (None, "none", "0")
 
 
 def _replaced(block, names):

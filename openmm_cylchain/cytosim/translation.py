@@ -175,6 +175,9 @@ class Translation:
                 own = Translation(script, self.document.title, stem, dimensions, folder, self.duration)
                 own._translate_run()
                 later.append(own.document)
+                # Those of filaments that come later.
+                self.start_files.update({**own.start_files, **self.start_files})
+                self.made = max(self.made, own.made, key=len)
             unbound = [own.unbound for own in self.script.later]
             add_stages(self.document, later, [own.run for own in (self.script, *self.script.later)], unbound)
 

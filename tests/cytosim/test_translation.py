@@ -384,9 +384,10 @@ def test_two_dimensions_are_found(tmp_path):
 
 
 def test_parts_and_bodies_are_said(tmp_path):
-    text = TUBE + "new tube\nset bead ball { confine = off }\nnew 3 ball { radius = 1 }\nrun 5000 system\nnew tube\n"
+    text = TUBE + "new tube\nset bead ball { confine = off }\nnew 3 ball { radius = 1 }\nrun 5000 system\ndelete tube\n"
+    text += "new tube\n"
     _, document = translated(tmp_path, text)
-    assert document.missing == ["stages: filaments that come, go or are cut", "bodies: beads"]
+    assert document.missing == ["stages: filaments that go, are cut, or come and grow", "bodies: beads"]
 
 
 def test_runs_become_stages(tmp_path):
@@ -450,6 +451,39 @@ def test_links_confinement_and_steric_come_and_go(tmp_path):
     assert [len(one.links) for one in own] == [0, 1, 1]
     assert own[2].links[0].stiffness == pytest.approx(2.0 * own[1].links[0].stiffness)
     assert [len(one.walls) for one in own] == [0, 1, 0]
+
+
+def test_fibers_come_with_a_run(tmp_path):
+    """Those with places in a line and those with places in a file, and a couple that joins two of them then."""
+    hold = "set hand hold { binding = 10, 0.05; unbinding = 0, inf }\n"
+    link = "set couple bond { hand1 = hold; hand2 = hold; stiffness = 100 }\n"
+    shape = "shape = 0 0 0, 1 0 0, 1.5 0.5 0; placement = off"
+    text = (
+        TUBE
+        + hold
+        + link
+        + (
+            f"new 2 tube {{ length = 3 }}\nnew tube {{ {shape} }}\nrun 100 system\nnew tube {{ {shape} }}\nrun 50 system\n"
+            "new 3 tube { length = 2 }\nnew bond { attach1 = fiber1, 0; attach2 = fiber4, 0.5 }\n"
+        )
+    )
+    found, document = translated(tmp_path, text)
+    assert document.missing == []
+    every = [stage.configuration for stage in found.stages]
+    assert [[group.count for group in own.filaments if group.active] for own in every] == [
+        [2, 1],
+        [2, 1, 1],
+        [2, 1, 1, 3],
+    ]
+    assert [len(own.links) for own in every] == [0, 0, 1]
+    assert [place["filament"] for place in every[2].links[0].between] == [0, 3]
+
+
+def test_fibers_that_grow_do_not_come_with_a_run(tmp_path):
+    text = TUBE.replace("segmentation", "activity = grow; growing_speed = 0.1; segmentation")
+    found, document = translated(tmp_path, text + "new tube\nrun 5 system\nnew tube\n")
+    assert not found.stages
+    assert document.missing == ["stages: filaments that go, are cut, or come and grow"]
 
 
 def test_what_a_stage_cannot_change_is_said(tmp_path):
