@@ -97,7 +97,7 @@ def _are_same(records, before):
     # But for their steps.
     if before is None or len(records) != len(before):
         return False
-    return all(np.array_equal(records[name], before[name]) for name in CROSSLINK_RECORD.names if name != "step")
+    return all(np.array_equal(records[name], before[name]) for name in CROSSLINK_RECORD.fields or () if name != "step")
 
 
 def _records(table, force, step, periodic):

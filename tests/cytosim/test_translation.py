@@ -463,7 +463,8 @@ def test_fibers_come_with_a_run(tmp_path):
         + hold
         + link
         + (
-            f"new 2 tube {{ length = 3 }}\nnew tube {{ {shape} }}\nrun 100 system\nnew tube {{ {shape} }}\nrun 50 system\n"
+            f"new 2 tube {{ length = 3 }}\nnew tube {{ {shape} }}\nrun 100 system\n"
+            f"new tube {{ {shape} }}\nrun 50 system\n"
             "new 3 tube { length = 2 }\nnew bond { attach1 = fiber1, 0; attach2 = fiber4, 0.5 }\n"
         )
     )
