@@ -16,7 +16,7 @@ from .initial_state import box_vectors, recommended_step
 from .run import Recorder, steps
 from .run_directory import RunDirectory
 from .stage_transition import carry_over
-from .stages import stages_of
+from .stages import naming_stage, stages_of
 from .steady_populations import steady_population
 from .summary import group_labels, group_members
 
@@ -134,10 +134,10 @@ def _stages(stages, current):
         if id(stage.configuration) in known:
             continue
         known.add(id(stage.configuration))
-        if stage.number:
-            before, current = current, stage_simulation(stage, first)
-            carry_over(before, current, stage, stages[0].configuration.simulation.seed)
-        with located_instability(stage.configuration), steps():
+        with naming_stage(stage), located_instability(stage.configuration), steps():
+            if stage.number:
+                before, current = current, stage_simulation(stage, first)
+                carry_over(before, current, stage, stages[0].configuration.simulation.seed)
             current[0].step(_STEPS_OF_STAGE)
 
 

@@ -39,7 +39,7 @@ from .rows_of_forces import RowsOfForces
 from .run_directory import Checkpoint, RunDirectory
 from .signals import Signals
 from .stage_transition import carry_over
-from .stages import stage_at, stages_of
+from .stages import naming_stage, stage_at, stages_of
 
 _SECONDS_BETWEEN_CHECKS = 0.2
 _MEASURED_REPORTS = 3
@@ -126,7 +126,7 @@ def _run_stages(stages, stage, first, current, directory, checkpoint, signals, p
     # From a stage on, which is in the state of its Simulation.
     seed = stages[0].configuration.simulation.seed
     while True:
-        with located_instability(stage.configuration), steps():
+        with naming_stage(stage), located_instability(stage.configuration), steps():
             checkpoint = Recorder(stage, current[1].filaments, current[0], directory, checkpoint, stages).run_to_end(
                 signals, progress
             )
@@ -134,7 +134,8 @@ def _run_stages(stages, stage, first, current, directory, checkpoint, signals, p
             return
         stage, before = stages[stage.number + 1], current
         current = stage_simulation(stage, first)
-        carry_over(before, current, stage, seed)
+        with naming_stage(stage):
+            carry_over(before, current, stage, seed)
         _write_crosslinks(directory, current[0], stages, stage.first_step)
 
 
@@ -145,7 +146,8 @@ def check_stages(stages):
         if stage.is_piece or id(stage.configuration) in known:
             continue
         known.add(id(stage.configuration))
-        current = create_simulation(stage.configuration) if first is None else stage_simulation(stage, first)
+        with naming_stage(stage):
+            current = create_simulation(stage.configuration) if first is None else stage_simulation(stage, first)
         first = first or current
 
 

@@ -7,7 +7,6 @@ import functools
 
 import numpy as np
 
-from ..errors import InputError
 from ..systems.carried_state import carry_state
 from .relaxation import relaxed_again
 from .tables.linkers import KEPT
@@ -31,11 +30,7 @@ def carry_over(before, after, stage, seed):
     """
     (old, old_built), (new, built) = before, after
     generator = np.random.default_rng([seed, stage.number, 6])
-    try:
-        change = functools.partial(_change_linkers, stage, generator)
-        carry_state(old.context, new.context, change)
-    except InputError as error:
-        raise InputError(f"Stage {stage.name!r} cannot go on from the one before: {error}") from None
+    carry_state(old.context, new.context, functools.partial(_change_linkers, stage, generator))
     pairs = list(zip(old_built.filaments, built.filaments))
     have_come = any(own.takes_part and not other.takes_part for other, own in pairs)
     if have_come and stage.configuration.relaxes and all(own.growth is None for own in built.filaments):

@@ -4,11 +4,13 @@ A stage is the configuration before it with some keys in the place of others, an
 What a message says of a value that a stage has set is said at the line of that stage.
 """
 
+import contextlib
 import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import InputError, InstabilityError
 from ..units.quantities import TIME
 from .keys import ConfigurationError, Place, Quantity
 from .stage_changes import apply_stage, in_unit_of
@@ -98,6 +100,21 @@ def stages_of(configuration):
 def stage_at(stages, step):
     """The Stage in which a step is taken: the first one for zero."""
     return next(own for own in stages if step <= own.last_step)
+
+
+@contextlib.contextmanager
+def naming_stage(stage):
+    """A context whose errors say in which stage of a run they are."""
+    try:
+        yield
+    except InstabilityError as error:
+        raise type(error)(f"{error}{_in_words(stage)}", **error.place) from None
+    except InputError as error:
+        raise InputError(f"{error}{_in_words(stage)}") from None
+
+
+def _in_words(stage):
+    return f" (In stage {stage.name!r}.)" if stage.name else ""
 
 
 def frame_steps(configuration):

@@ -297,6 +297,32 @@ def test_fluctuations_in_a_trap_are_those_of_each_stage(tmp_path):
         assert squares.mean() == pytest.approx(expected, abs=4.0 * error)
 
 
+def test_recommended_steps_are_those_of_each_stage(tmp_path, capsys):
+    path = tmp_path / "staged.toml"
+    path.write_text(TRAPS)
+    assert main(["timestep", str(path)]) == 0
+    said = [line for line in capsys.readouterr().out.splitlines() if line.startswith("stage")]
+    assert [line.partition(":")[0] for line in said] == ["stage 'soft'", "stage 'stiff'", "stage 'warm'"]
+    assert [line.rpartition(" here ")[2] for line in said] == ["200 ns", "200 ns", "100 ns"]
+
+
+def test_errors_of_a_stage_say_which(tmp_path):
+    text = (
+        NETWORK.replace('duration = "1 ms"\n', "checks = false\n")
+        + """
+[[stage]]
+duration = "0.1 ms"
+[[stage]]
+name = "fast"
+duration = "0.1 ms"
+linkers.motor.hand.binding_rate = "1e17 1/s"
+"""
+    )
+    with pytest.raises(InputError, match=r"line 14: .*\(In stage 'fast'\.\)"):
+        run(parse_configuration(text), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
 def test_dry_run_begins_each_stage():
     lines = list(dry_run(parse_configuration(MANY_CHANGES)))
     assert "    drug: from 200 us to 400 us" in lines
