@@ -12,7 +12,8 @@ from .growth import add_monomers
 from .linkers import add_linkers
 from .nucleation import add_event
 from .places import Draw
-from .script import count_of, read_script
+from .script import New, count_of, read_script
+from .settings import Settings
 from .simulation import (
     add_box,
     add_contacts,
@@ -44,7 +45,6 @@ _NEEDS = {
     **{("fiber", key): "walls: several, or of their own laws" for key in _OWN_WALLS},
     ("fiber", "field"): "fields",
     ("fiber", "glue"): "surfaces: glue",
-    ("run", "event"): "events during a run",
     ("new single", "attach"): "bodies",
 }
 """What keys need that nothing here asks for, by the kind of what has them."""
@@ -198,12 +198,25 @@ class Translation:
                 new.settings.take_rest()
                 if count_of(new, self.space()):
                     self.left_out(f"{new.kind} {new.name}", new.line, _BODIES[new.kind])
+        self._add_event_of_run()
         add_linkers(self, linked)
         add_monomers(self, self.growings)
         add_contacts(self)
         add_walls(self)
         add_simulation(self)
         self._note_unused()
+
+    def _add_event_of_run(self):
+        # event = RATE, ( CODE )
+        run = self.script.run
+        if run is None or "event" not in run:
+            return
+        line = run.line_of("event")
+        rate, code = run.text("event"), run.text(("event", 1), default="")
+        settings = Settings("event of run", line)
+        settings.set("rate", [rate], line)
+        settings.set("code", [code], line)
+        add_event(self, New(1, "event", "event", settings, line))
 
     def _add_spaces(self):
         for new in self.script.created:

@@ -82,7 +82,7 @@ def apply_stage(tables, table, place, kinds):
             raise here.error(f"must be a table: write [stage.{name}] below the keys of the stage.")
         if kind.repeated:
             _change_several(changes, kind, value, here)
-        else:
+        elif isinstance(tables.get(name, {}), dict):
             changes.tables[name] = _changed(changes, dict(tables.get(name, {})), kind, value, (name,), here)
     return changes
 
@@ -94,11 +94,14 @@ def _change_several(changes, kind, value, here):
             f"changes a {kind.header} of the file, which has none: write it there, with active = false or count = 0 "
             "if it comes later."
         )
+    if not all(isinstance(own, dict) for own in there):
+        # What is wrong with it is said where it is read.
+        return
     there = list(there)
     names = {str(number): [number - 1] for number in range(1, len(there) + 1)}
     for number, own in enumerate(there):
         for key in ("name", "type"):
-            if isinstance(own, dict) and isinstance(own.get(key), str):
+            if isinstance(own.get(key), str):
                 names.setdefault(own[key], []).append(number)
                 break
     for name, own in value.items():

@@ -230,9 +230,10 @@ def _pieces(leaf, changes):
 
 def _as_they_are(tables):
     # What holds for the beginning of a stage alone, of linkers, is said by that stage.
-    if not isinstance(tables.get("linkers"), list):
+    linkers = tables.get("linkers")
+    if not isinstance(linkers, list) or not all(isinstance(own, dict) for own in linkers):
         return tables
-    kept = [{key: own[key] for key in own if key not in _AT_THE_BEGINNING} for own in tables["linkers"]]
+    kept = [{key: own[key] for key in own if key not in _AT_THE_BEGINNING} for own in linkers]
     return {**tables, "linkers": kept}
 
 

@@ -342,6 +342,11 @@ def test_events_begin_fibers(tmp_path):
     assert group.nucleation.rate == pytest.approx(3 / SECOND)
     assert group.nucleation.length == pytest.approx(500, rel=0.02)
     assert document.missing == []
+    # The same in a run.
+    code = "( new tube { length = 0.5; plus_end = grow; position = ball 2; } )"
+    found, document = translated(tmp_path, own, run=f"run 1000 system {{ event = 3, {code} }}\n")
+    assert found.filaments[-1].nucleation.rate == pytest.approx(3 / SECOND)
+    assert document.missing == []
     _, document = translated(tmp_path, TUBE + "new tube\nnew event { rate = 3; code = ( delete 1 tube ) }\n")
     assert document.missing == ["events during a run"]
     _, document = translated(tmp_path, TUBE + "new tube\nnew event { delay = 3; code = (report fiber x.txt {a=1}) }\n")
