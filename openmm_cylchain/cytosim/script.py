@@ -40,13 +40,17 @@ class Property:
 
 @dataclass
 class New:
-    """Objects that are created: how many, of which class and property, and with which settings."""
+    """Objects that are created: how many, of which class and property, and with which settings.
+
+    ``before`` is how many filaments are made before them, once that is known.
+    """
 
     count: int
     kind: str
     name: str
     settings: Settings
     line: int
+    before: int | None = None
 
 
 @dataclass

@@ -67,6 +67,8 @@ class Translation:
         self.nucleated = []
         self.growings, self.made, self.filament_count, self.start_files = [], [], 0, {}
         self._spaces, self._type_names = {}, {}
+        # How many filaments there were when what is translated was created, of those that it may name; None for all.
+        self.made_before = None
         self.dimensions = self._find_dimensions(dimensions)
         self.contact_diameter = contact_diameter(script)
         self.steps = max(1, script.steps)
@@ -112,10 +114,10 @@ class Translation:
     def find_filament(self, text):
         """The filament that an attachment names, such as actin1, fiber2 or last; None if there is none."""
         words = re.fullmatch(r"(last|first|[A-Za-z]\w*?)\s*[:~]?\s*(-?\s*\d+)?", (text or "").strip())
-        if words is None or not self.made:
+        made = self.made[: self.made_before]
+        if words is None or not made:
             return None
         name, number = words[1], int((words[2] or "0").replace(" ", ""))
-        made = self.made
         if name == "last":
             index = len(made) - 1 + (number if number <= 0 else -number)
         elif name == "first":
@@ -188,6 +190,7 @@ class Translation:
         add_box(self)
         linked = []
         for new in self.script.created:
+            new.before = len(self.made)
             if new.kind == "fiber":
                 add_filaments(self, new)
             elif new.kind in ("single", "couple"):

@@ -485,6 +485,17 @@ def test_fibers_come_with_a_run(tmp_path):
     assert [place["filament"] for place in every[2].links[0].between] == [0, 3]
 
 
+def test_the_last_fiber_is_that_of_its_time(tmp_path):
+    hold = "set hand hold { binding = 10, 0.05; unbinding = 0, inf }\n"
+    link = "set couple bond { hand1 = hold; hand2 = hold; stiffness = 100 }\n"
+    bond = "new bond { attach1 = fiber1, 0; attach2 = last, 0.5 }\n"
+    tube = "new tube { length = 3 }\n"
+    found, document = translated(tmp_path, TUBE + hold + link + tube + tube + bond + "run 10 system\n" + tube + bond)
+    assert document.missing == []
+    links = found.stages[1].configuration.links
+    assert [own.between[1]["filament"] for own in links] == [1, 2]
+
+
 def test_fibers_that_grow_do_not_come_with_a_run(tmp_path):
     text = TUBE.replace("segmentation", "activity = grow; growing_speed = 0.1; segmentation")
     found, document = translated(tmp_path, text + "new tube\nrun 5 system\nnew tube\n")
