@@ -300,6 +300,68 @@ def test_fluctuations_in_a_trap_are_those_of_each_stage(tmp_path):
         assert squares.mean() == pytest.approx(expected, abs=4.0 * error)
 
 
+GROWTH = """
+[solvent]
+temperature = "300 K"
+viscosity = "1 mPa*s"
+[[monomers]]
+name = "unit"
+length = "5 nm"
+plus_on_rate = "400 1/(uM*s)"
+plus_off_rate = "300 1/s"
+concentration = "4 uM"
+volume = "20 um^3"
+[[filament]]
+name = "GROWS"
+diameter = "10 nm"
+segment_length = "100 nm"
+persistence_length = "10 um"
+stretching_modulus = "1 nN"
+segments = 4
+count = 60
+growth = { longest = "5 um" }
+[simulation]
+time_step = "0.5 ms"
+report_interval = "10 ms"
+seed = 7
+checks = false
+[[stage]]
+name = "rich"
+duration = "100 ms"
+[[stage]]
+name = "poor"
+duration = "100 ms"
+monomers.concentration = "1 uM"
+[[stage]]
+name = "capped"
+duration = "50 ms"
+[stage.monomers]
+plus_on_rate = "0 1/(uM*s)"
+plus_off_rate = "1e-9 1/s"
+"""
+
+
+def test_growth_follows_the_monomers_of_each_stage(tmp_path):
+    """k_on c - k_off, at the concentrations that the pool has; and monomers that come or go are counted."""
+    run(parse_configuration(GROWTH), tmp_path / "out")
+    table = read_reports(tmp_path / "out" / "growth.csv")
+    lengths = (table["plus end (monomers)"] - table["minus end (monomers)"]).sum(axis=1)
+    free = table["free monomers (uM)"][:, 0]
+    volume = 20.0 * 602.214
+    total = free * volume + lengths
+    assert total[1:11] == pytest.approx(total[0], abs=0.1)
+    # The concentration at first is 3 uM less now.
+    assert total[11:] == pytest.approx(total[0] - 3.0 * volume, abs=1.0)
+    for stage, rates in ((slice(0, 11), (400.0, 300.0)), (slice(11, 21), (400.0, 300.0)), (slice(21, 26), (0.0, 1e-9))):
+        seconds = np.diff(table["time (ms)"][stage, 0]) / 1e3
+        mean = 0.5 * (free[stage][1:] + free[stage][:-1])
+        gained = 60.0 * np.sum(rates[0] * mean * seconds)
+        lost = 60.0 * rates[1] * seconds.sum()
+        error = np.sqrt(gained + lost)
+        assert gained == 0.0 or error < 0.05 * gained
+        assert lengths[stage][-1] - lengths[stage][0] == pytest.approx(gained - lost, abs=4.0 * error + 1e-9)
+
+
 def test_recommended_steps_are_those_of_each_stage(tmp_path, capsys):
     path = tmp_path / "staged.toml"
     path.write_text(TRAPS.replace("count = 600", "count = 2"))
