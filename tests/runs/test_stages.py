@@ -309,7 +309,7 @@ name = "unit"
 length = "5 nm"
 plus_on_rate = "400 1/(uM*s)"
 plus_off_rate = "300 1/s"
-concentration = "4 uM"
+concentration = "6 uM"
 volume = "20 um^3"
 [[filament]]
 name = "GROWS"
@@ -331,7 +331,7 @@ duration = "100 ms"
 [[stage]]
 name = "poor"
 duration = "100 ms"
-monomers.concentration = "1 uM"
+monomers.concentration = "4 uM"
 [[stage]]
 name = "capped"
 duration = "50 ms"
@@ -350,8 +350,8 @@ def test_growth_follows_the_monomers_of_each_stage(tmp_path):
     volume = 20.0 * 602.214
     total = free * volume + lengths
     assert total[1:11] == pytest.approx(total[0], abs=0.1)
-    # The concentration at first is 3 uM less now.
-    assert total[11:] == pytest.approx(total[0] - 3.0 * volume, abs=1.0)
+    # The concentration at first is 2 uM less now.
+    assert total[11:] == pytest.approx(total[0] - 2.0 * volume, abs=1.0)
     for stage, rates in ((slice(0, 11), (400.0, 300.0)), (slice(11, 21), (400.0, 300.0)), (slice(21, 26), (0.0, 1e-9))):
         seconds = np.diff(table["time (ms)"][stage, 0]) / 1e3
         mean = 0.5 * (free[stage][1:] + free[stage][:-1])
