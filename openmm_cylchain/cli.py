@@ -251,8 +251,24 @@ def _time_step(options):
         step = replace(recommended, step=settings.time_step)
         print(f"  dynamics at that step: {step.describe_dynamics()}")
     _step_of_system(configuration)
+    _steps_of_stages(configuration)
     if options.check:
         _check_time_step(configuration, options)
+
+
+def _steps_of_stages(configuration):
+    # Of those that are no pieces, and of other configurations than those before.
+    from .runs.initial_state import recommended_step
+    from .units.text import format_time
+
+    told = set()
+    for stage in configuration.stages:
+        own, settings = stage.configuration, stage.configuration.simulation
+        if not stage.is_piece and id(own) not in told:
+            told.add(id(own))
+            recommended = recommended_step(own, settings.scheme, settings.engine, settings.seed)
+            steps = f"recommended {format_time(recommended.step, 4)}, here {format_time(settings.time_step, 4)}"
+            print(f"stage {stage.name!r}: {steps}")
 
 
 def _step_of_system(configuration):

@@ -31,7 +31,7 @@ from .networks import contact_map, contraction, filament_distances, find_bundles
 from .order import director, order_parameter, order_tensor
 from .run_filaments import RunFilament, RunParticles
 from .run_loading import load
-from .runs import Run
+from .runs import Run, RunStage
 from .stress import Stress, stress
 
 __all__ = [
@@ -44,6 +44,7 @@ __all__ = [
     "Run",
     "RunFilament",
     "RunParticles",
+    "RunStage",
     "Stress",
     "TangentCorrelation",
     "bending_drift",

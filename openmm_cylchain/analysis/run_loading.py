@@ -86,7 +86,11 @@ def _whole_frames(files, description):
             "they are not of one run."
         )
     frames = min(len(energies["step"]), len(dcd))
-    expected = np.arange(frames) * description.steps_per_frame
+    if description.stages:
+        expected = np.array([0, *(step for own in description.stages for step in own.steps)])[:frames]
+        frames = len(expected)
+    else:
+        expected = np.arange(frames) * description.steps_per_frame
     if description.steps is None and frames:
         # A RunReporter may come into a Simulation that has gone on for a while.
         expected += int(energies["step"][0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -38,6 +38,15 @@ _SHAPES = {
     "box": lambda point, vector, length: Box(point, vector),
     "ellipsoid": lambda point, vector, length: Ellipsoid(point, vector),
 }
+
+
+@dataclass(frozen=True)
+class RunStage:
+    """A stage of a run: its name, when it begins in ps, and the numbers of its frames, but for that at its begin."""
+
+    name: str
+    begin: float
+    frames: range
 
 
 class Run:
@@ -354,6 +363,20 @@ class Run:
     @property
     def _type_names(self):
         return {int(node): own.type.name for own in self.filaments for node in own.nodes}
+
+    @property
+    def stages(self) -> tuple[RunStage, ...]:
+        """The stages of the run, in their order: none of one that has no ``[[stage]]`` tables."""
+        found: list[RunStage] = []
+        first = 1
+        for own in self._description.stages:
+            frames = range(first, min(first + own.frames, len(self)))
+            first += own.frames
+            if own.is_piece:
+                found[-1] = RunStage(found[-1].name, found[-1].begin, range(found[-1].frames.start, frames.stop))
+            else:
+                found.append(RunStage(own.name, own.begin, frames))
+        return tuple(own for own in found if len(own.frames))
 
     def nodes(self, frame: int) -> list[FloatArray]:
         """Positions (nodes, 3) in nm of the nodes that each filament has in a frame: none where it is not there."""

@@ -56,9 +56,14 @@ class CrosslinkFile:
         forces = [force for force in system.getForces() if Crosslinks.of_force(force) is not None]
         self._periodic = [force.usesPeriodicBoundaryConditions() for force in forces]
         self._written: Any = None
+        self._before: Any = None
         count = None
         if append:
-            count = int(np.searchsorted(read_records(path)["step"], step, "right"))
+            before = read_records(path)
+            count = int(np.searchsorted(before["step"], step, "right"))
+            if count:
+                begin = int(np.searchsorted(before["step"], before["step"][count - 1], "left"))
+                self._before = np.array(before[begin:count])
         self._file = RecordFile(path, CROSSLINK_RECORD, "crosslinks", count)
 
     def write(self, context: openmm.Context, step: int) -> None:
@@ -71,12 +76,13 @@ class CrosslinkFile:
             _records(table, number, step, periodic)
             for number, (table, periodic) in enumerate(zip(tables, self._periodic))
         ]
-        records = np.concatenate(parts)
+        records = np.concatenate([np.zeros(0, CROSSLINK_RECORD), *parts])
         if not len(records):
             records = np.zeros(1, CROSSLINK_RECORD)
             records["step"], records["number"] = step, -1
-        self._file.write(records)
-        self._written = identities
+        if not _are_same(records, self._before):
+            self._file.write(records)
+        self._written, self._before = identities, None
 
     def synchronise(self) -> None:
         """Bring everything to disk."""
@@ -85,6 +91,13 @@ class CrosslinkFile:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
+
+
+def _are_same(records, before):
+    # But for their steps.
+    if before is None or len(records) != len(before):
+        return False
+    return all(np.array_equal(records[name], before[name]) for name in CROSSLINK_RECORD.fields or () if name != "step")
 
 
 def _records(table, force, step, periodic):

@@ -1,6 +1,6 @@
 """The tables of a run that have forces of walls and of contacts."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from ..filaments.collection import FilamentCollection
 from ..output.run_files import RunFiles
@@ -26,11 +26,26 @@ class ForceTables:
         filaments: FilamentCollection,
     ) -> None:
         """Append lines of a report at a time in ps."""
-        if self._walls is not None:
-            for place, row in zip(*rows_of_walls(walls)):
+        self.write_rows(
+            step,
+            time,
+            zip(*rows_of_walls(walls)) if self._walls is not None else (),
+            rows_of_contacts(contacts, filaments) if self._contacts is not None else (),
+        )
+
+    def write_rows(
+        self,
+        step: int,
+        time: float,
+        walls: Iterable[tuple[tuple[int, int], tuple[float, ...]]],
+        contacts: Iterable[tuple[float, ...]],
+    ) -> None:
+        """Append lines: what ``rows_of_walls`` says of each wall and face, and ``rows_of_contacts`` of filaments."""
+        for place, row in walls:
+            if self._walls is not None:
                 self._walls.write(step, (time, *place, *row))
-        if self._contacts is not None:
-            for number, row in enumerate(rows_of_contacts(contacts, filaments)):
+        for number, row in enumerate(contacts):
+            if self._contacts is not None:
                 self._contacts.write(step, (time, number, *row))
 
     def synchronise(self) -> tuple[int, int]:

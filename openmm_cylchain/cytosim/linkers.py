@@ -41,7 +41,9 @@ def add_linkers(translation, news):
         own = translation.script.named(new.name, new.kind, new.line)
         linked = kinds.setdefault(new.name, Linked())
         adder = _couples if own.kind == "couple" else _singles
+        translation.made_before = new.before
         adder(translation, own, new, linked)
+        translation.made_before = None
     for name, linked in kinds.items():
         own = translation.script.properties[name]
         if linked.points or linked.count:

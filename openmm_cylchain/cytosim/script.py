@@ -1,7 +1,7 @@
-"""What a configuration of Cytosim does: its commands, followed one after the other until the run that is translated.
+"""What a configuration of Cytosim does: its commands, followed one after the other up to each of its runs.
 
-A run of ours goes on with one set of values. Where there are several runs, and something changes between them, the
-longest is taken, with all that is there when it begins.
+Runs between which values change, linkers come and go, or fibers come are stages of one run of ours. Runs between which
+fibers go, are cut or come and grow are of different parts, of which the longest is taken.
 """
 
 import math
@@ -20,7 +20,9 @@ KINDS = (*KINDS, "nucleus", "fake", "organizer")
 """Classes of objects, apart from simul."""
 
 _WITHOUT_EFFECT = ("report", "write", "export", "save", "mark", "call", "dump", "print")
-_STATES = ("cut", "delete", "move", "import", "load", "equilibrate", "change")
+_STATES = ("cut", "move", "import", "load", "equilibrate")
+_SOLVE = "solve"
+FILAMENTS_CHANGE = "stages: filaments that go, are cut, or come and grow"
 _MOST_COMMANDS, _MOST_FILES = 200_000, 10
 _BRACKETED = re.compile(r"\[([^\[\]]*)\]")
 _RANGE = re.compile(r"([A-Za-z_]\w*)=(-?\d+):(-?\d+)(?::(-?\d+))?")
@@ -38,20 +40,27 @@ class Property:
 
 @dataclass
 class New:
-    """Objects that are created: how many, of which class and property, and with which settings."""
+    """Objects that are created: how many, of which class and property, and with which settings.
+
+    ``before`` is how many filaments are made before them, once that is known.
+    """
 
     count: int
     kind: str
     name: str
     settings: Settings
     line: int
+    before: int | None = None
 
 
 @dataclass
 class Script:
-    """What is there when the run that is translated begins: properties by their names, and objects in their order.
+    """What is there when a run begins: properties by their names, and objects in their order.
 
-    ``stages`` are (line, sentence) of what happens between runs, ``choices`` those of what was chosen in a template.
+    ``later`` are the Scripts of the runs that follow, as stages of one run; ``stages`` are (line, sentence, what it
+    needs) of what is left out of others, ``choices`` (line, sentence) of what was chosen in a template. ``broken`` is
+    (line, sentence) of what has happened to filaments since the run before, and ``unbound`` which of the hands that are
+    not bound have taken their linkers away since then, by names.
     """
 
     simul: Settings = field(default_factory=lambda: Settings("simul", 1))
@@ -61,6 +70,15 @@ class Script:
     steps: int = 0
     stages: list = field(default_factory=list)
     choices: list = field(default_factory=list)
+    later: list = field(default_factory=list)
+    broken: list = field(default_factory=list)
+    unbound: dict = field(default_factory=dict)
+    frames: int = 0
+
+    @property
+    def duration(self):
+        """Of this run and those that follow, in s."""
+        return sum(max(1, own.steps) * own.time_step for own in (self, *self.later))
 
     def named(self, name, kind, line):
         """A Property of a class, by its name. ScriptError if there is none."""
@@ -89,7 +107,7 @@ def read_script(path, given=None):
         raise ScriptError(1, 'this is no configuration of Cytosim: it has no "set", such as set simul system { ... }')
     whole = _Follower(Path(path).parent)
     whole.follow(commands)
-    script = whole.up_to_longest()
+    script = whole.script()
     script.choices = choices
     return script
 
@@ -129,35 +147,63 @@ class _Follower:
                 return False
         return True
 
-    def up_to_longest(self):
-        """The Script when the longest run begins, or at the end of a file without runs."""
-        script, runs = Script(), []
-        # Runs between which nothing happens are one.
-        for number, (line, what, action) in enumerate(self._actions):
-            if what == "run":
-                settings, steps = action(script)
-                if runs and not runs[-1]["between"]:
-                    runs[-1]["steps"] += steps
-                else:
-                    runs.append({"number": number, "steps": steps, "line": line, "between": []})
-                runs[-1]["settings"] = settings
-                continue
-            if what and runs:
-                runs[-1]["between"].append((line, what))
-            action(script)
-        if not runs:
-            return script
-        longest = max(runs, key=lambda run: run["steps"])
-        script = Script(run=longest["settings"], steps=longest["steps"])
-        for _, what, action in self._actions[: longest["number"]]:
+    def script(self):
+        """The Script of the first run of the longest part; or at the end of a file without runs."""
+        parts = self._parts()
+        if not parts:
+            return self._replayed(len(self._actions))
+        chosen = max(parts, key=lambda part: sum(run["steps"] for run in part))
+        scripts, notes, unbound = [], 0, {}
+        for run in chosen:
+            own = self._replayed(run["number"])
+            own.run, own.steps, own.frames = run["settings"], run["steps"], run["frames"]
+            between, notes = own.stages[notes:], len(own.stages)
+            own.stages = between if scripts else []
+            own.unbound, unbound = {k: v for k, v in own.unbound.items() if v != unbound.get(k)}, own.unbound
+            scripts.append(own)
+        first, *first.later = scripts
+        for number, part in enumerate(parts):
+            if part is not chosen:
+                # What lies between it and those that are taken.
+                (line, what), *_ = parts[number + (parts.index(chosen) > number)][0]["broken"]
+                text = f"{sum(run['steps'] for run in part)} steps of other runs, apart by {what}"
+                first.stages.append((line, text, FILAMENTS_CHANGE))
+        first.stages += [note for own in first.later for note in own.stages]
+        return first
+
+    def _parts(self):
+        # Lists of runs, between which filaments come, go or are cut; runs between which nothing happens are one.
+        script, parts, last, known = Script(), [], None, 0
+        for number, (_, what, action) in enumerate(self._actions):
             if what != "run":
                 action(script)
-        if len(runs) > 1:
-            script.stages.append(
-                (longest["line"], f"the run of {longest['steps']} steps is taken of {len(runs)}, all others left out")
-            )
-        for run in runs[:-1]:
-            script.stages += run["between"]
+                continue
+            settings, steps = action(script)
+            frames = int(settings.number("nb_frames", default=0.0))
+            follows = last is not None and not any(self._changes(last, number))
+            last = number
+            before = parts[-1][-1] if parts else None
+            if follows and settings.text(_SOLVE) == before["settings"].text(_SOLVE):
+                before["steps"] += steps
+                before["frames"] += frames
+                continue
+            broken, known = script.broken[known:], len(script.broken)
+            run = {"number": number, "settings": settings, "steps": steps, "frames": frames, "broken": broken}
+            if parts and not broken:
+                parts[-1].append(run)
+            else:
+                parts.append([run])
+        parts = [[run for run in part if run["steps"] > 0] or part[:1] for part in parts]
+        return parts
+
+    def _changes(self, first, last):
+        return (what for _, what, _ in self._actions[first + 1 : last] if what)
+
+    def _replayed(self, number):
+        script = Script()
+        for _, what, action in self._actions[:number]:
+            if what != "run":
+                action(script)
         return script
 
     def _add(self, command, what, action):
@@ -168,8 +214,49 @@ class _Follower:
         if command.verb in _WITHOUT_EFFECT:
             return True
         if command.verb in _STATES:
-            return self._add(command, f"{command.verb} {' '.join(command.words)}".strip(), lambda script: None)
+            what = f"{command.verb} {' '.join(command.words)}".strip()
+
+            def happen(script):
+                script.broken.append((command.line, what))
+
+            return self._add(command, what, happen)
         raise ScriptError(command.line, f"{command.verb!r} is no command of Cytosim.")
+
+    def _do_delete(self, command):
+        words = [word for word in command.words if word != "all"]
+        count = int(words.pop(0)) if words and words[0].isdigit() else None
+        settings = Settings.of("delete", command.line, command.block)
+        conditions = [key for key in settings._values if key not in ("nb_objects", "mark")]
+        mark = settings.text("mark")
+        what = f"delete {' '.join(command.words)}"
+
+        def delete(script):
+            name = words[-1] if words else "*"
+            every = [new for new in script.created if name in (new.name, new.kind, "*")]
+            every = [new for new in every if mark is None or new.settings.text("mark") == mark]
+            if any(new.kind == "fiber" for new in every):
+                script.broken.append((command.line, what))
+            if conditions and set(conditions) <= {"state1", "state2"} and count is None:
+                for key in conditions:
+                    if settings.text(key) == "0":
+                        script.unbound.setdefault(name, set()).add(key)
+                return
+            if conditions:
+                text = f"{what}, by {conditions[0]} = {settings.text(conditions[0])}"
+                if any(new.kind in ("single", "couple") for new in every):
+                    script.stages.append((command.line, text, "stages: linkers that go by where or how they are"))
+                return
+            left = count
+            for new in every:
+                if left is None or isinstance(new.count, str):
+                    script.created.remove(new)
+                    continue
+                gone = min(left, new.count)
+                new.count, left = new.count - gone, left - gone
+                if new.count == 0:
+                    script.created.remove(new)
+
+        return self._add(command, what, delete)
 
     def _do_set(self, command):
         words = [word for word in " ".join(command.words).replace(":", " ").split() if not word.isdigit()]
@@ -209,6 +296,14 @@ class _Follower:
             else:
                 # The one simul has any name.
                 found = [script.simul]
+            # Spaces have their sizes from when they are created.
+            kind, every = (name, None) if whole else ("space", name)
+            spaces = [
+                own.settings
+                for own in script.created
+                if own.kind == "space" == kind and every in (own.name, None) and not parameter
+            ]
+            found = spaces or found
             for settings in found:
                 if parameter:
                     settings.set(parameter[0], [command.block.text.strip()], command.line)
@@ -240,6 +335,8 @@ class _Follower:
             # A count such as [10 * volume] is known with the space.
             count = first if first.startswith("[") else int(first)
             script.created.append(New(count, own, name, settings, command.line))
+            if own == "fiber" and _grows(script.properties[name], settings):
+                script.broken.append((command.line, f"new {' '.join(words)}, which grows"))
 
         return self._add(command, f"new {' '.join(words)}", create)
 
@@ -303,6 +400,11 @@ class _Follower:
             raise ScriptError(command.line, f"in {command.words[0]}, {error}") from None
 
     _do_include = _do_read
+
+
+def _grows(own, options):
+    # Whether fibers may grow: those cannot come between runs of one part.
+    return own.kind == "fiber" and own.settings.peek("activity") not in (None, "none", "0")
 
 
 def _replaced(block, names):

@@ -9,7 +9,7 @@ from .settings import OFF
 _BOLTZMANN = 1.380649e-5
 """In pN um/K."""
 _COLDEST = 1e-3
-_USUAL_FRAMES = 100
+_USUAL_FRAMES, _USUAL_FRAMES_OF_STAGE = 100, 10
 _MOST_STEPS_PER_FRAME = 10**7
 _STILL = 1e8
 """In pN s/um^2: a viscosity in which fibers stand still."""
@@ -148,8 +148,9 @@ def add_simulation(translation):
         quantity(script.time_step, "s"),
         Note(EXACT, "see openmm-cylchain timestep", simul.line_of("time_step")),
     )
-    frames = 0 if run is None else int(run.number("nb_frames", default=0.0))
-    per_frame = max(1, math.ceil(steps / (frames if frames > 0 else _USUAL_FRAMES)))
+    frames = script.frames
+    usual = _USUAL_FRAMES if steps * script.time_step == translation.duration else _USUAL_FRAMES_OF_STAGE
+    per_frame = max(1, math.ceil(steps / (frames if frames > 0 else usual)))
     if per_frame > _MOST_STEPS_PER_FRAME:
         raise InputError(f"{steps} steps are too many for {frames} frames.")
     whole = per_frame * math.ceil(steps / per_frame)

@@ -12,7 +12,8 @@ from .growth import add_monomers
 from .linkers import add_linkers
 from .nucleation import add_event
 from .places import Draw
-from .script import count_of, read_script
+from .script import New, count_of, read_script
+from .settings import Settings
 from .simulation import (
     add_box,
     add_contacts,
@@ -23,6 +24,7 @@ from .simulation import (
     thermal_energy,
 )
 from .spaces import make_space
+from .stages import add_stages
 
 _BODIES = {
     "solid": "bodies: solids",
@@ -43,7 +45,6 @@ _NEEDS = {
     **{("fiber", key): "walls: several, or of their own laws" for key in _OWN_WALLS},
     ("fiber", "field"): "fields",
     ("fiber", "glue"): "surfaces: glue",
-    ("run", "event"): "events during a run",
     ("new single", "attach"): "bodies",
 }
 """What keys need that nothing here asks for, by the kind of what has them."""
@@ -57,7 +58,7 @@ class Translation:
     ``start_files`` are arrays of positions in nm by the names of files, which lie beside the configuration.
     """
 
-    def __init__(self, script, title, stem, dimensions=None, folder="."):
+    def __init__(self, script, title, stem, dimensions=None, folder=".", duration=None):
         self._folder = folder
         self.script, self.document, self._stem = script, Document(title), stem
         self.generator = np.random.default_rng(_SEED)
@@ -66,10 +67,13 @@ class Translation:
         self.nucleated = []
         self.growings, self.made, self.filament_count, self.start_files = [], [], 0, {}
         self._spaces, self._type_names = {}, {}
+        # How many filaments there were when what is translated was created, of those that it may name; None for all.
+        self.made_before = None
         self.dimensions = self._find_dimensions(dimensions)
         self.contact_diameter = contact_diameter(script)
         self.steps = max(1, script.steps)
-        self.duration = self.steps * script.time_step
+        self.duration = script.duration if duration is None else duration
+        self._path = stem, dimensions, folder
 
     def left_out(self, text, line, needs):
         """Note what is left out, and what it needs."""
@@ -110,10 +114,10 @@ class Translation:
     def find_filament(self, text):
         """The filament that an attachment names, such as actin1, fiber2 or last; None if there is none."""
         words = re.fullmatch(r"(last|first|[A-Za-z]\w*?)\s*[:~]?\s*(-?\s*\d+)?", (text or "").strip())
-        if words is None or not self.made:
+        made = self.made[: self.made_before]
+        if words is None or not made:
             return None
         name, number = words[1], int((words[2] or "0").replace(" ", ""))
-        made = self.made
         if name == "last":
             index = len(made) - 1 + (number if number <= 0 else -number)
         elif name == "first":
@@ -160,16 +164,33 @@ class Translation:
         return shape == "circle" or (two and shape in _WITH_EVERY_LENGTH)
 
     def translate(self):
-        """Write all of the document."""
+        """Write all of the document, with a stage for each run."""
         for line, text in self.script.choices:
             self.document.note(NEAREST, text, line)
-        for line, text in self.script.stages:
-            self.left_out(text, line, "stages: what changes between runs")
+        for line, text, needs in self.script.stages:
+            self.left_out(text, line, needs)
+        self._translate_run()
+        if self.script.later:
+            stem, dimensions, folder = self._path
+            later = []
+            for script in self.script.later:
+                own = Translation(script, self.document.title, stem, dimensions, folder, self.duration)
+                own._translate_run()
+                later.append(own.document)
+                # Those of filaments that come later.
+                self.start_files.update({**own.start_files, **self.start_files})
+                self.made = max(self.made, own.made, key=len)
+            unbound = [own.unbound for own in self.script.later]
+            add_stages(self.document, later, [own.run for own in (self.script, *self.script.later)], unbound)
+
+    def _translate_run(self):
+        # What is there when a run begins.
         add_solvent(self)
         self._add_spaces()
         add_box(self)
         linked = []
         for new in self.script.created:
+            new.before = len(self.made)
             if new.kind == "fiber":
                 add_filaments(self, new)
             elif new.kind in ("single", "couple"):
@@ -180,12 +201,25 @@ class Translation:
                 new.settings.take_rest()
                 if count_of(new, self.space()):
                     self.left_out(f"{new.kind} {new.name}", new.line, _BODIES[new.kind])
+        self._add_event_of_run()
         add_linkers(self, linked)
         add_monomers(self, self.growings)
         add_contacts(self)
         add_walls(self)
         add_simulation(self)
         self._note_unused()
+
+    def _add_event_of_run(self):
+        # event = RATE, ( CODE )
+        run = self.script.run
+        if run is None or "event" not in run:
+            return
+        line = run.line_of("event")
+        rate, code = run.text("event"), run.text(("event", 1), default="")
+        settings = Settings("event of run", line)
+        settings.set("rate", [rate], line)
+        settings.set("code", [code], line)
+        add_event(self, New(1, "event", "event", settings, line))
 
     def _add_spaces(self):
         for new in self.script.created:

@@ -65,6 +65,8 @@ class Filament:
         It has not begun yet: both of its nodes are in one place, which is no place of a filament.
     nucleation : kinetics.nucleation.Nucleation or None
         How those that have not begun do so, if not as a part of one that is cut.
+    takes_part : bool
+        Linkers bind to it. One that does not stands aside: see ``Filaments.set_aside``.
     """
 
     type: ChainType
@@ -79,6 +81,7 @@ class Filament:
     spare_nodes: int = 0
     is_reserve: bool = False
     nucleation: Any = None
+    takes_part: bool = True
 
     def __post_init__(self) -> None:
         require_kind(self.type, ChainType, "Filament: type")

@@ -129,8 +129,9 @@ def place_linkers(
 
 
 def _add_hand(force, hand, filaments, name):
-    chains = [i for i, filament in enumerate(filaments) if hand.binds(filament.type)]
-    if not chains:
+    every = [i for i, filament in enumerate(filaments) if hand.binds(filament.type)]
+    chains = [i for i in every if filaments[i].takes_part]
+    if not every:
         types = sorted({filament.type.name for filament in filaments})
         raise InputError(
             f"Linkers {name!r}: a hand binds to filaments of the type {' or '.join(hand.binds_to)}, of which there are "

@@ -145,7 +145,7 @@ class FirstPlaces:
         # lengths along these, and how far a curve is from them.
         columns: list[list[FloatArray]] = [[], [], [], [], [], []]
         for number, (filament, contour) in enumerate(zip(self._filaments, self._contours)):
-            if not hand.binds(filament.type) or filament.is_reserve:
+            if not (hand.binds(filament.type) and filament.takes_part) or filament.is_reserve:
                 continue
             nodes, bows = self._nodes(number), np.zeros(filament.segments)
             if filament.control_points is not None:
@@ -176,7 +176,7 @@ class FirstPlaces:
         return vectors if self._box is None else to_nearest_images(vectors, self._box)
 
     def _binds(self, hand):
-        return np.array([hand.binds(filament.type) for filament in self._filaments])
+        return np.array([hand.binds(filament.type) and filament.takes_part for filament in self._filaments])
 
     def _sites(self, spacing, lengths):
         return np.floor(np.minimum(lengths / spacing, _MOST_SITES) + 1e-9).astype(int)

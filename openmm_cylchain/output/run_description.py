@@ -111,6 +111,30 @@ class DescribedContacts:
 
 
 @dataclass(frozen=True)
+class DescribedStage:
+    """A stage of a run: its name, when it begins in ps, steps before it, and steps from each frame to the next.
+
+    One with ramps is divided: what follows its first piece ``is_piece``.
+    """
+
+    name: str
+    begin: float
+    first_step: int
+    steps_per_frame: int
+    frames: int
+    is_piece: bool = False
+
+    @property
+    def steps(self) -> range:
+        """Those of its frames."""
+        return range(
+            self.first_step + self.steps_per_frame,
+            self.first_step + self.steps_per_frame * self.frames + 1,
+            self.steps_per_frame,
+        )
+
+
+@dataclass(frozen=True)
 class RunDescription:
     """What a run simulates.
 
@@ -129,6 +153,8 @@ class RunDescription:
     contacts : tuple of DescribedContacts
     others : tuple of DescribedParticles
         Beside filaments.
+    stages : tuple of DescribedStage
+        Where it is divided into such; the steps of frames are those of them then.
     """
 
     title: str
@@ -143,10 +169,13 @@ class RunDescription:
     walls: tuple[DescribedWall, ...] = ()
     contacts: tuple[DescribedContacts, ...] = ()
     others: tuple[DescribedParticles, ...] = ()
+    stages: tuple[DescribedStage, ...] = ()
 
     @property
     def frames(self) -> int | None:
         """Of the whole run, with that at its start; None if nobody has said how long it will be."""
+        if self.stages:
+            return 1 + sum(own.frames for own in self.stages)
         return None if self.steps is None else self.steps // self.steps_per_frame + 1
 
     def write(self, path: Path) -> None:
@@ -178,6 +207,7 @@ class RunDescription:
             "walls": [dataclasses.asdict(own) for own in self.walls],
             "contacts": [dataclasses.asdict(own) for own in self.contacts],
             "others": [dataclasses.asdict(own) for own in self.others],
+            "stages": [dataclasses.asdict(own) for own in self.stages],
         }
         write_atomically(path, (json.dumps(content, allow_nan=False) + "\n").encode())
 
@@ -215,6 +245,7 @@ def read_run_description(path: Path) -> RunDescription:
         content["linkers"] = tuple(DescribedLinkers(**own) for own in content["linkers"])
         content["walls"] = tuple(DescribedWall(**_as_tuples(own)) for own in content["walls"])
         content["contacts"] = tuple(DescribedContacts(**_as_tuples(own)) for own in content.get("contacts", ()))
+        content["stages"] = tuple(DescribedStage(**own) for own in content.get("stages", ()))
         content["others"] = tuple(DescribedParticles(**_as_tuples(own)) for own in content.get("others", ()))
         return RunDescription(**content)
     except (ValueError, KeyError, TypeError, IndexError, AttributeError):

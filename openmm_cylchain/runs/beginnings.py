@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ..errors import InputError
 
-START_NAMES = ("network", "bundle", "gliding", "treadmilling", "microtubules", "dna", "force-extension")
+START_NAMES = ("network", "bundle", "gliding", "treadmilling", "microtubules", "stages", "dna", "force-extension")
 
 
 def start_text(kind):

@@ -16,8 +16,9 @@ from ..kinetics.binding_force import BINDING_FORCE_NAME
 from ..mechanics.flow import Flow
 from .initial_state import recommended_step
 from .keys import ConfigurationError, Place, Text
+from .stages import read_stages
 from .start_files import digest_of, find_start_file
-from .table import UnknownKeyError
+from .table import ACTIVE, UnknownKeyError
 from .tables.couplings import (
     CONTACTS,
     LINK,
@@ -41,6 +42,7 @@ from .tables.nucleation import BRANCHING, NUCLEATION, check_places, read_branchi
 from .tables.particles import PARTICLES, read_particles
 from .tables.simulation import SIMULATION, SimulationSettings, read_seed, read_simulation
 from .tables.solvent import BOX, FLOW, SOLVENT, Solvent, read_flow, read_solvent
+from .tables.stages import STAGE
 from .toml_lines import lines_of, read_toml
 
 TABLES = (
@@ -92,7 +94,8 @@ class Configuration:
 
     ``text`` is the file that it was read from, ``box`` the edges of a box in nm, ``tables`` what was read from each
     table by its name, ``start_files`` the digests of files that filaments start from by their paths, ``lines`` where
-    entries stand, ``path`` the name of its file, empty if it has none.
+    entries stand, ``path`` the name of its file, empty if it has none. Where there are ``stages``, all else is that of
+    the first one, but for the steps, which are those of all.
     """
 
     title: str
@@ -115,6 +118,7 @@ class Configuration:
     start_files: dict = dataclasses.field(default_factory=dict, compare=False)
     lines: dict = dataclasses.field(default_factory=dict, compare=False, repr=False)
     path: str = dataclasses.field(default="", compare=False, repr=False)
+    stages: tuple = dataclasses.field(default=(), compare=False, repr=False)
 
     @property
     def relaxes(self):
@@ -136,10 +140,15 @@ def read_configuration(path):
     except UnicodeDecodeError:
         raise InputError(f"The configuration {path} is not UTF-8 text: save it as UTF-8.") from None
     try:
-        return dataclasses.replace(parse_configuration(text, path.parent), path=str(path))
+        return _in_file(parse_configuration(text, path.parent), str(path))
     except InputError as error:
         separator = ", " if str(error).startswith("line ") else ": "
         raise InputError(f"{path}{separator}{error}") from None
+
+
+def _in_file(configuration, path):
+    stages = [dataclasses.replace(own, configuration=_in_file(own.configuration, path)) for own in configuration.stages]
+    return dataclasses.replace(configuration, path=path, stages=tuple(stages))
 
 
 def parse_configuration(text, folder="."):
@@ -168,11 +177,20 @@ def configuration_of(entries, text, folder, lines):
     ConfigurationError
     """
     try:
+        if STAGE.name in entries:
+            return _staged(entries, lambda raw: _configuration(raw, text, Path(folder), lines))
         return _configuration(entries, text, Path(folder), lines)
     except UnknownKeyError as error:
         raise error.with_suggestion(_OWNERS).with_line(lines) from None
     except ConfigurationError as error:
         raise error.with_line(lines) from None
+
+
+def _staged(raw, read):
+    stages = read_stages(raw, TABLES, read)
+    first = stages[0].configuration
+    steps = sum(own.configuration.simulation.steps for own in stages)
+    return dataclasses.replace(first, stages=stages, simulation=dataclasses.replace(first.simulation, steps=steps))
 
 
 def _configuration(raw, text, folder, lines):
@@ -219,7 +237,7 @@ def _configuration(raw, text, folder, lines):
 
 def _read_tables(raw):
     # Entries of all tables: a list for each kind.
-    known = ("title", *(kind.name for kind in TABLES))
+    known = ("title", *(kind.name for kind in TABLES), STAGE.name)
     for name in raw:
         if name not in known:
             raise UnknownKeyError(Place("the configuration", ()), name, known)
@@ -244,6 +262,8 @@ def _read_tables(raw):
                     f"{kind.name!r} must be a table: write {kind.header} once, with its keys below it.", (kind.name,)
                 )
             tables[kind.name] = [kind.read(found, Place(kind.header, (kind.name,)))]
+        if ACTIVE.name in kind.names and kind is not FILAMENT:
+            tables[kind.name] = [own for own in tables[kind.name] if own[ACTIVE.name]]
     if not (tables["filament"] or tables["nucleation"]):
         raise InputError("There is no [[filament]] table: add one for every kind of filament.")
     return tables
@@ -350,6 +370,12 @@ def changed_keys(first, second):
             continue
         for before, after in zip(one, other):
             names += [f"{before.label} {key}" for key in kind.names if before.values[key] != after.values[key]]
+    if [own.name for own in first.stages] != [own.name for own in second.stages]:
+        names.append("the names or the number of its stages")
+    for one, other in zip(first.stages, second.stages):
+        found = [] if one.configuration.simulation.steps == other.configuration.simulation.steps else ["its duration"]
+        found += changed_keys(one.configuration, other.configuration)
+        names += [f"{key} in stage {one.name!r}" for key in found if key not in names]
     if list(first.start_files.values()) != list(second.start_files.values()):
         names.append("the content of a file to start from")
     return names

@@ -11,6 +11,7 @@ from ..mechanics.geometry import unrolled
 from ..output.colors import PLUS_END, PLUS_END_COLOR, colors_of_filaments
 from ..units.text import time_unit
 from .figure_style import FONT_SIZE, legend, length_unit
+from .stages import frame_steps
 
 _NARROWEST = 0.4
 
@@ -38,7 +39,7 @@ class Conformations:
 
     def __init__(self, configuration, groups, loads, trajectory, records, springs, frames, polar):
         self._box = None if configuration.box is None else np.array(configuration.box)[:2]
-        self._steps = configuration.simulation.steps_per_report
+        self._steps = frame_steps(configuration)
         self._trajectory, self._records = trajectory, records
         self._groups = [
             (group, load, [own for own in members if loads[own] == load])
@@ -76,7 +77,7 @@ class Conformations:
         if self._polar and ends:
             places = np.array(ends) if self._box is None else np.mod(ends, self._box)
             axis.plot(*places.T, "o", color=PLUS_END_COLOR, markersize=3.5, zorder=3, label=PLUS_END)
-        step = self._records["step"] == frame % len(self._trajectory) * self._steps
+        step = self._records["step"] == self._steps[frame % len(self._trajectory)]
         for number, (label, colour) in enumerate(self._springs):
             own = self._records[step & (self._records["type"] == number)]
             places = own["places"][~np.isnan(own["places"]).any(axis=(1, 2))].astype(float)

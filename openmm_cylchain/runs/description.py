@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+from ..output.run_description import DescribedStage
 from ..systems.described_runs import describe_system
 from ..units.quantities import PICONEWTON
 from .initial_state import box_vectors
@@ -28,7 +29,20 @@ def describe(configuration, filaments, system, topology):
         diameters=dict(enumerate(diameters, system.getNumParticles() - len(diameters))),
     )
     described = zip(description.filaments, loads_of_filaments(configuration))
-    return replace(description, filaments=tuple(replace(own, load=load) for own, load in described))
+    stages = [
+        DescribedStage(
+            own.name,
+            own.begin,
+            own.first_step,
+            own.configuration.simulation.steps_per_report,
+            own.reports,
+            own.is_piece,
+        )
+        for own in configuration.stages
+    ]
+    return replace(
+        description, stages=tuple(stages), filaments=tuple(replace(own, load=load) for own, load in described)
+    )
 
 
 def loads_of_filaments(configuration):

@@ -1,5 +1,6 @@
 """What a run would be, without one: what is built, what binds its step, how long it takes, how large its files get."""
 
+import itertools
 import tempfile
 
 import numpy as np
@@ -8,16 +9,20 @@ from ..kinetics.branching import Branching
 from ..output.run_tables import ENERGY_COLUMNS, GROWTH_TABLE_COLUMNS, LINKER_TABLE_COLUMNS
 from ..units.text import format_time
 from .configuration import linker_labels, named_bound
+from .created_simulation import begin, create_simulation, stage_simulation
 from .errors_of_tables import located_instability
 from .growth_summary import ENDS, MICROMOLAR, free_rate, populations
 from .initial_state import box_vectors, recommended_step
-from .run import Recorder, begin, create_simulation, steps
+from .run import Recorder, steps
 from .run_directory import RunDirectory
+from .stage_transition import carry_over
+from .stages import naming_stage, stages_of
 from .steady_populations import steady_population
 from .summary import group_labels, group_members
 
 _MEASURED_SECONDS = 3.0
 _PER_SECOND, _PER_SECOND_AND_UM = 1e12, 1e15
+_STEPS_OF_STAGE = 2
 _BYTES_OF_NUMBER = 20
 """Of a number in a table, with its comma."""
 
@@ -28,17 +33,20 @@ def dry_run(configuration):
     InputError if the configuration cannot be simulated, InstabilityError if its first steps cannot be taken.
     """
     settings = configuration.simulation
-    simulation, built = create_simulation(configuration)
-    begin(configuration, simulation, built)
+    stages = stages_of(configuration)
+    simulation, built = create_simulation(stages[0].configuration)
+    begin(stages[0].configuration, simulation, built)
     recommended = recommended_step(configuration, settings.scheme, settings.engine, settings.seed, built)
     yield configuration.title or "Run"
     yield from _what_is_built(configuration, built)
     yield (
-        f"  {settings.steps} steps of {format_time(settings.time_step)}, scheme {settings.scheme}, "
+        f"  {settings.steps} steps of {_time_steps(stages)}, scheme {settings.scheme}, "
         f"{built.filaments.engine} engine, platform {simulation.context.getPlatform().getName()}"
     )
     yield f"  recommended {format_time(recommended.step)}: {_binding(configuration, recommended)}"
-    yield from _cost(configuration, simulation, built.filaments)
+    yield from _cost(configuration, stages, simulation, built.filaments)
+    if len(stages) > 1:
+        yield from _stages(stages, (simulation, built))
 
 
 def _what_is_built(configuration, built):
@@ -108,12 +116,38 @@ def _binding(configuration, recommended):
     return f"{named_bound(configuration, names[0])}" if names and ":" in names[0] else recommended.reason
 
 
-def _cost(configuration, simulation, filaments):
+def _time_steps(stages):
+    return " and ".join(dict.fromkeys(format_time(own.configuration.simulation.time_step) for own in stages))
+
+
+def _stages(stages, current):
+    # In turn, with a few steps of each, which is to say that each can be begun.
+    yield "  stages, each of which takes its first steps:"
+    first, known = current, set()
+    for stage in stages:
+        if not stage.is_piece:
+            pieces = [own for own in stages[stage.number :] if own.begin >= stage.begin]
+            count = 1 + sum(1 for _ in itertools.takewhile(lambda own: own.is_piece, pieces[1:]))
+            end = pieces[count - 1].end
+            divided = f", in {count} pieces" if count > 1 else ""
+            yield f"    {stage.name}: from {format_time(stage.begin)} to {format_time(end)}{divided}"
+        if id(stage.configuration) in known:
+            continue
+        known.add(id(stage.configuration))
+        with naming_stage(stage), located_instability(stage.configuration), steps():
+            if stage.number:
+                before, current = current, stage_simulation(stage, first)
+                carry_over(before, current, stage, stages[0].configuration.simulation.seed)
+            current[0].step(_STEPS_OF_STAGE)
+
+
+def _cost(configuration, stages, simulation, filaments):
     settings = configuration.simulation
     with tempfile.TemporaryDirectory() as folder, located_instability(configuration), steps():
-        recorder = Recorder(configuration, filaments, simulation, RunDirectory(folder), None)
+        recorder = Recorder(stages[0], filaments, simulation, RunDirectory(folder), None, stages)
         step, seconds = recorder.seconds_of_run(_MEASURED_SECONDS)
-    particles, reports = simulation.system.getNumParticles(), settings.steps // settings.steps_per_report + 1
+    seconds *= settings.steps / stages[0].configuration.simulation.steps
+    particles, reports = simulation.system.getNumParticles(), sum(own.reports for own in stages) + 1
     # A frame of a DCD file has three records of single-precision numbers, and one of the box.
     trajectory = 276 + reports * (3 * (4 * particles + 8) + (56 if configuration.box is not None else 0))
     tables = reports * _BYTES_OF_NUMBER * len(ENERGY_COLUMNS)
@@ -122,10 +156,15 @@ def _cost(configuration, simulation, filaments):
     tables += reports * _BYTES_OF_NUMBER // 2 * len(GROWTH_TABLE_COLUMNS) * grow
     return [
         f"  about {_duration(seconds)} for steps and reports: {1e3 * step:.3g} ms a step at first",
-        f"  {reports} frames, every {format_time(settings.steps_per_report * settings.time_step)}: trajectory of "
+        f"  {reports} frames, every {_intervals(stages)}: trajectory of "
         f"{_size(trajectory)}, tables of about {_size(tables)}"
         + (", and a record of 100 bytes for each linker that is bound" if configuration.linkers else ""),
     ]
+
+
+def _intervals(stages):
+    every = (own.configuration.simulation for own in stages)
+    return " or ".join(dict.fromkeys(format_time(own.steps_per_report * own.time_step) for own in every))
 
 
 def _duration(seconds):

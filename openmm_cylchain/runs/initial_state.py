@@ -17,6 +17,7 @@ from ..couplings.pulling import constant_force, constant_tension
 from ..couplings.walls import filament_wall_force, wall_force
 from ..errors import InputError
 from ..filaments import shapes
+from ..filaments.filaments_that_take_part import FilamentsThatTakePart
 from ..filaments.monomers import Monomers
 from ..filaments.segment_place import SegmentPlace
 from ..output.progress import LateMessages, ProgressMessages
@@ -51,7 +52,7 @@ class BuiltSystem:
 
 
 @located_errors
-def build_system(configuration, engine, seed, kinetics=True):
+def build_system(configuration, engine, seed, kinetics=True, begun=None):
     """The System of a configuration.
 
     Parameters
@@ -61,22 +62,25 @@ def build_system(configuration, engine, seed, kinetics=True):
         Of random places and shapes.
     kinetics : bool
         Whether to have linkers, and monomers that come and go.
+    begun : Filaments, optional
+        Whose initial positions are taken, in the place of drawn ones.
 
     Returns
     -------
     BuiltSystem
     """
-    filaments = place_filaments(configuration, engine, seed, kinetics)
+    filaments = place_filaments(configuration, engine, seed, kinetics, begun)
     topology, system, positions = filaments.build(box_vectors(configuration.box))
     positions, spheres, radii, friction = _add_particles(configuration, seed, topology, system, positions)
+    present = filaments if all(own.takes_part for own in filaments) else FilamentsThatTakePart(filaments)
     count = add_links(configuration, filaments, system, seed)
     _add_joints(configuration, filaments, system)
     tables = configuration.tables
-    if configuration.contacts is not None:
+    if configuration.contacts is not None and len(present):
         own = configuration.contacts
         with tables["contacts"][0].naming():
             force = capsule_contact_force(
-                filaments,
+                present,
                 system,
                 own.diameter,
                 own.stiffness,
@@ -87,7 +91,7 @@ def build_system(configuration, engine, seed, kinetics=True):
         system.addForce(force)
     for own, entries in zip(configuration.walls, tables["wall"]):
         with entries.naming():
-            system.addForce(_wall(own, filaments, system, spheres, radii))
+            system.addForce(_wall(own, present, system, spheres, radii))
     for own, entries in zip(configuration.pulls, tables["pull"]):
         with entries.naming():
             system.addForce(_pull(own, filaments))
@@ -129,7 +133,7 @@ def recommended_step(configuration, scheme, engine, seed, built=None):
     return built.filaments.recommended_time_step(scheme, system=built.system, **built.arguments())
 
 
-def place_filaments(configuration, engine, seed, kinetics=True):
+def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
     """Filaments with their initial positions, tethers and linkers.
 
     Filaments without a position are laid out side by side on a grid in the xy plane, centred on the origin, for the eye
@@ -140,6 +144,8 @@ def place_filaments(configuration, engine, seed, kinetics=True):
     Parameters
     ----------
     engine : {"compiled", "portable"} or None
+    begun : Filaments, optional
+        Whose positions are taken.
 
     Returns
     -------
@@ -162,6 +168,9 @@ def place_filaments(configuration, engine, seed, kinetics=True):
         for index in range(group.count):
             progress.one_is_done()
             number = len(filaments)
+            if begun is not None:
+                _add(filaments, group, begun[number].positions, begun[number].control_points, kinetics)
+                continue
             places = np.random.default_rng([seed, number, 1])
             own = group, index, solvent.temperature, seed, number, places, box, centers
             nodes, control_points = _nodes(*own, planar if group.planar else None)
@@ -169,6 +178,11 @@ def place_filaments(configuration, engine, seed, kinetics=True):
                 planar.add(number, nodes, group.closed)
             _add(filaments, group, nodes, control_points, kinetics)
     messages.finish()
+    first = 0
+    for group in configuration.filaments:
+        for number in range(first, first + group.count) if not group.active else ():
+            filaments.set_aside(number)
+        first += group.count
     if configuration.contacts is not None:
         for number, filament in enumerate(filaments):
             if not filament.type.segment_kind.straight:

@@ -6,6 +6,7 @@ python -m openmm_cylchain.runs.reference > docs/configuration.md
 from .configuration import TABLES
 from .keys import REQUIRED, Choice, Either, Listing
 from .table import TableKind
+from .tables.stages import CHANGES, STAGE
 
 _INTRODUCTION = """# The file of a run
 
@@ -31,7 +32,24 @@ def reference_page():
         parts += section(kind, "##", kind.header, known)
         if kind.name == "filament":
             parts.append(_FILES)
+    parts += section(STAGE, "##", STAGE.header, known)
+    parts += _changes()
     return "\n".join(parts)
+
+
+def _changes():
+    # Which keys stages may change.
+    yield (
+        "Beside these it has tables that change others, by their names, and by the names or numbers of tables where "
+        "there are several: `[stage.linkers.myosin]`, `[stage.wall.2]`, `[stage.wall]` for all walls. A value that "
+        "goes from one to another is `{ from = ..., to = ... }`. `[[stage.stage]]` tables in place of a duration are "
+        "stages that come one after the other, as often as `repeat` says. [Stages](stages.md) has examples.\n"
+    )
+    yield "| table | keys that a stage may change |\n|---|---|"
+    headers = {kind.name: kind.header for kind in TABLES}
+    for name, keys in CHANGES.items():
+        yield f"| `{headers[name]}` | {', '.join(f'`{key}`' for key in keys)} |"
+    yield ""
 
 
 def section(kind, level, title, known=None):

@@ -6,14 +6,12 @@ import time
 
 import numpy as np
 import openmm
-from openmm import app, unit
+from openmm import unit
 
 from ..couplings.crosslink_records import CrosslinkFile
-from ..couplings.crosslinks import Crosslinks
 from ..couplings.force_tables import ForceTables
 from ..couplings.mean_forces import contact_forces, wall_forces
 from ..engines.description import describe_lengths, filament_label
-from ..engines.gpu_platforms import GPU_PLATFORMS, enable_platform
 from ..errors import InputError, InstabilityError
 from ..mechanics.broken_segment import find_broken_segment
 from ..output.growth_reporter import rows_of_growth
@@ -27,19 +25,21 @@ from ..systems.described_runs import (
     total_energies,
     write_topology,
 )
-from ..systems.refused_context import refusal
 from ..systems.step_check import check_time_step
-from ..time_steps.precision import PRECISIONS
 from ..units.quantities import thermal_energy
 from ..units.text import format_time
 from .countless_events import refuse_countless_events
+from .created_simulation import begin, create_simulation, platform_of, stage_simulation
 from .description import describe
 from .errors_of_tables import located_errors, located_instability
 from .initial_state import build_system
 from .moving_tethers import MovingTethers
 from .relaxation import relaxed_positions
+from .rows_of_forces import RowsOfForces
 from .run_directory import Checkpoint, RunDirectory
 from .signals import Signals
+from .stage_transition import carry_over
+from .stages import naming_stage, stage_at, stages_of
 
 _SECONDS_BETWEEN_CHECKS = 0.2
 _MEASURED_REPORTS = 3
@@ -80,28 +80,40 @@ def run(configuration, output, resume=False):
     RunInterrupted
         After SIGINT or SIGTERM.
     """
-    simulation, built = create_simulation(configuration)
-    filaments = built.filaments
+    stages = stages_of(configuration)
+    if len(stages) > 1 and not resume:
+        check_stages(stages)
+    first = create_simulation(stages[0].configuration)
     with RunDirectory(output) as directory:
         checkpoint = directory.claim(configuration, resume)
-        settings = configuration.simulation
-        if checkpoint is not None and checkpoint.step == settings.steps:
+        if checkpoint is not None and checkpoint.step == configuration.simulation.steps:
             print(f"The run in {directory.path} is finished: nothing to resume.")
             return
         if checkpoint is None:
             if resume:
                 print("No checkpoint yet: starting from the beginning.")
-            positions = begin(configuration, simulation, built)
-            write_topology(directory, simulation.topology, filaments, simulation.system, positions)
-            describe(configuration, filaments, simulation.system, simulation.topology).write(directory.description)
-            _write_crosslinks(directory, simulation)
+            stage, current = stages[0], first
+            simulation, built = first
+            positions = begin(stage.configuration, *first)
+            write_topology(directory, simulation.topology, built.filaments, simulation.system, positions)
+            describe(configuration, built.filaments, simulation.system, simulation.topology).write(
+                directory.description
+            )
+            _write_crosslinks(directory, simulation, stages)
         else:
-            _restore(simulation.context, checkpoint, filaments.engine)
-            _check_crosslinks(directory, simulation, checkpoint.step)
-            print(f"Resuming at step {checkpoint.step}, {format_time(checkpoint.step * settings.time_step)}.")
+            stage = stage_at(stages, checkpoint.step)
+            current = first if stage.number == 0 else stage_simulation(stage, first)
+            _restore(current[0].context, checkpoint, current[1].filaments.engine)
+            _check_crosslinks(directory, current[0], stages, checkpoint.step)
+            where = f" in {stage.name}" if stage.name else ""
+            print(f"Resuming at step {checkpoint.step}, {format_time(stage.time(checkpoint.step))}{where}.")
         try:
-            with located_instability(configuration), steps():
-                Recorder(configuration, filaments, simulation, directory, checkpoint).run_to_end()
+            with Signals() as signals:
+                progress = _Progress(stages, 0 if checkpoint is None else checkpoint.step)
+                try:
+                    _run_stages(stages, stage, first, current, directory, checkpoint, signals, progress)
+                finally:
+                    progress.finish()
         except InstabilityError as error:
             raise type(error)(
                 f"{error} What came before is kept in {directory.path}; run the changed configuration in another "
@@ -110,41 +122,33 @@ def run(configuration, output, resume=False):
             ) from None
 
 
-@located_errors
-def create_simulation(configuration):
-    """The Simulation of a configuration, without positions, and its BuiltSystem.
-
-    InputError if it cannot be built, or the platform cannot simulate it.
-    """
-    settings = configuration.simulation
-    built = build_system(configuration, settings.engine, settings.seed)
-    filaments = built.filaments
-    refuse_countless_events(configuration, filaments)
-    platform, properties = _platform(settings, filaments.engine)
-    integrator = filaments.create_integrator(
-        built.system,
-        settings.time_step,
-        scheme=settings.scheme,
-        random_seed=settings.seed,
-        checks=settings.checks,
-        precision=_of_filaments(settings, filaments.engine) or "automatic",
-        **built.arguments(),
-    )
-    try:
-        return app.Simulation(built.topology, built.system, integrator, platform, properties), built
-    except openmm.OpenMMException as error:
-        raise refusal(error, built.system, integrator, platform) from None
+def _run_stages(stages, stage, first, current, directory, checkpoint, signals, progress):
+    # From a stage on, which is in the state of its Simulation.
+    seed = stages[0].configuration.simulation.seed
+    while True:
+        with naming_stage(stage), located_instability(stage.configuration), steps():
+            checkpoint = Recorder(stage, current[1].filaments, current[0], directory, checkpoint, stages).run_to_end(
+                signals, progress
+            )
+        if stage.number == len(stages) - 1:
+            return
+        stage, before = stages[stage.number + 1], current
+        current = stage_simulation(stage, first)
+        with naming_stage(stage):
+            carry_over(before, current, stage, seed)
+        _write_crosslinks(directory, current[0], stages, stage.first_step)
 
 
-@located_errors
-def begin(configuration, simulation, built):
-    """Bring a Simulation of a configuration to where the run begins, and return the positions."""
-    positions = relaxed_positions(configuration, built)
-    if configuration.relaxes and configuration.linkers:
-        # Linkers may begin elsewhere now.
-        simulation.context.reinitialize()
-    simulation.context.setPositions(positions)
-    return positions
+def check_stages(stages):
+    """Raise InputError if a stage cannot be simulated that comes after the first one."""
+    first, known = None, set()
+    for stage in stages:
+        if stage.is_piece or id(stage.configuration) in known:
+            continue
+        known.add(id(stage.configuration))
+        with naming_stage(stage):
+            current = create_simulation(stage.configuration) if first is None else stage_simulation(stage, first)
+        first = first or current
 
 
 @contextlib.contextmanager
@@ -182,7 +186,7 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
     built = build_system(configuration, settings.engine, settings.seed)
     refuse_countless_events(configuration, built.filaments)
     positions = relaxed_positions(configuration, built, say)
-    platform, properties = _platform(settings, built.filaments.engine)
+    platform, properties = platform_of(settings, built.filaments.engine)
     # An interruption that Python raises within a step may end as an error of OpenMM.
     with Signals() as signals, located_instability(configuration), steps():
         check = check_time_step(
@@ -208,51 +212,18 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
     return check
 
 
-def _of_filaments(settings, engine):
-    # The precision if it is that of filaments. Others are of the platform, and so is any with the portable engine, and
-    # on GPUs, where filaments are in double precision.
-    own = engine == "compiled" and settings.platform not in GPU_PLATFORMS
-    return settings.precision if own and settings.precision in PRECISIONS else None
-
-
-def _platform(settings, engine):
-    if engine == "compiled" and settings.platform in GPU_PLATFORMS:
-        try:
-            enable_platform(settings.platform)
-        except InputError as error:
-            raise InputError(f'[simulation] platform: {error} "Reference" always can.') from None
-    names = [openmm.Platform.getPlatform(index).getName() for index in range(openmm.Platform.getNumPlatforms())]
-    if settings.platform not in names:
-        raise InputError(
-            f"[simulation] platform must be one of those that OpenMM has loaded, {', '.join(names)}, but is "
-            f"{settings.platform!r}."
-        )
-    platform = openmm.Platform.getPlatformByName(settings.platform)
-    properties = {}
-    # Forces must be summed in a fixed order for a resumed run to be identical to an unbroken one.
-    if "DeterministicForces" in platform.getPropertyNames():
-        properties["DeterministicForces"] = "true"
-    if settings.precision not in (None, "automatic") and _of_filaments(settings, engine) is None:
-        if "Precision" not in platform.getPropertyNames():
-            raise InputError(
-                f"[simulation] precision cannot be chosen on the platform {settings.platform}: leave it out."
-            )
-        properties["Precision"] = settings.precision
-    if settings.threads is not None:
-        properties["Threads"] = str(settings.threads)
-    return platform, properties
-
-
-def _write_crosslinks(directory, simulation):
-    # Those of a configuration stay as they are.
-    if Crosslinks.from_system(simulation.system):
-        with contextlib.closing(CrosslinkFile(directory.crosslinks, simulation.system)) as file:
-            file.write(simulation.context, 0)
+def _write_crosslinks(directory, simulation, stages, step=None):
+    # Those of a stage stay as they are; from a step on, they follow those that are there.
+    if any(own.configuration.links for own in stages):
+        file = CrosslinkFile(directory.crosslinks, simulation.system, step is not None, step or 0)
+        with contextlib.closing(file):
+            # The frame of the step is that of the stage before.
+            file.write(simulation.context, 0 if step is None else step + 1)
             file.synchronise()
 
 
-def _check_crosslinks(directory, simulation, step):
-    if Crosslinks.from_system(simulation.system):
+def _check_crosslinks(directory, simulation, stages, step):
+    if any(own.configuration.links for own in stages):
         CrosslinkFile(directory.crosslinks, simulation.system, append=True, step=step).close()
 
 
@@ -271,10 +242,27 @@ def _restore(context, checkpoint, engine):
         ) from None
 
 
+class _Progress:
+    # Of all stages.
+    def __init__(self, stages, step):
+        self._stages = stages
+        self._progress = RunProgress(stages[-1].end, stage_at(stages, step).time(step), 1.0)
+        self._step = step
+
+    def update(self, step):
+        self._step = step
+        self._progress.update(stage_at(self._stages, step).time(step))
+
+    def finish(self):
+        self._progress.finish(stage_at(self._stages, self._step).time(self._step))
+
+
 class Recorder:
     # Advances the simulation and writes frames, energies, linkers and checkpoints at their times.
 
-    def __init__(self, configuration, filaments, simulation, directory, checkpoint):
+    def __init__(self, stage, filaments, simulation, directory, checkpoint, stages=None):
+        configuration = stage.configuration
+        self._stage, self._stages = stage, stages or (stage,)
         self._settings = configuration.simulation
         self._kT = thermal_energy(configuration.solvent.temperature)
         self._filaments = filaments
@@ -282,25 +270,21 @@ class Recorder:
         self._directory = directory
         self._checkpoint = checkpoint
         self._step = 0 if checkpoint is None else checkpoint.step
-        self._moving = MovingTethers(configuration, filaments)
+        self._moving = MovingTethers(stage, filaments)
         self._grows = any(filament.growth is not None for filament in filaments)
-        self._has_forces = bool(configuration.walls), configuration.contacts is not None
+        self._rows = RowsOfForces(self._stages, configuration)
 
-    def run_to_end(self):
-        settings = self._settings
-        with self.files(), Signals() as signals:
+    def run_to_end(self, signals, progress):
+        """Take the steps of the stage that are left, and return the Checkpoint of its end."""
+        with self.files():
             if self._checkpoint is None:
                 self._report()
-            self._progress = RunProgress(settings.steps, self._step, settings.time_step)
-            try:
-                self._advance(signals)
-            finally:
-                self._progress.finish(self._step)
+            return self._advance(signals, progress)
 
     @contextlib.contextmanager
     def files(self):
         """A context in which the files of the run are open."""
-        settings, begun = self._settings, self._checkpoint
+        settings, begun = self._stages[0].configuration.simulation, self._checkpoint
         self._trajectory = TrajectoryFile(
             self._directory.trajectory,
             self._simulation.topology,
@@ -321,7 +305,7 @@ class Recorder:
         if self._grows:
             self._growth = ReportTable(self._directory.growth, begun and begun.growth_size)
             files.append(self._growth)
-        self._forces = ForceTables(self._directory, *self._has_forces, begun and begun.force_sizes)
+        self._forces = ForceTables(self._directory, *self._rows.there, begun and begun.force_sizes)
         files.append(self._forces)
         with contextlib.ExitStack() as stack:
             for file in files:
@@ -343,7 +327,7 @@ class Recorder:
             start, first, work = time.monotonic(), self._step, [(0, time.process_time())]
             while self._step == first or (self._step < max(settings.steps, 2) and time.monotonic() - start < most):
                 chunk = self._timed_steps(self._limited(chunk))
-                if moving and self._step % moving.interval == 0:
+                if moving and self._done % moving.interval == 0:
                     moving.move(self._simulation.context, self._step)
                 work.append((self._step - first, time.process_time()))
             taken = self._step - first
@@ -360,33 +344,39 @@ class Recorder:
         checkpoints = math.ceil(settings.steps / settings.steps_per_checkpoint)
         return step, settings.steps * slower * step + reports * report + checkpoints * checkpoint
 
+    @property
+    def _done(self):
+        # Steps of the stage.
+        return self._step - self._stage.first_step
+
     def _limited(self, chunk):
         # Up to the next report, or motion of tethers.
-        limits = [self._settings.steps_per_report - self._step % self._settings.steps_per_report]
+        limits = [self._settings.steps_per_report - self._done % self._settings.steps_per_report]
         if self._moving:
-            limits.append(self._moving.interval - self._step % self._moving.interval)
+            limits.append(self._moving.interval - self._done % self._moving.interval)
         return min(chunk, *limits)
 
-    def _advance(self, signals):
-        settings, moving = self._settings, self._moving
-        chunk = 1
+    def _advance(self, signals, progress):
+        settings, moving, last = self._settings, self._moving, self._stage.last_step
+        chunk, checkpoint = 1, self._checkpoint
         moving.move(self._simulation.context, self._step)
-        while self._step < settings.steps:
+        while self._step < last:
             chunk = self._timed_steps(self._limited(chunk))
-            if self._step % settings.steps_per_report == 0:
+            if self._done % settings.steps_per_report == 0:
                 self._report()
-            if moving and self._step % moving.interval == 0:
+            if moving and self._done % moving.interval == 0:
                 moving.move(self._simulation.context, self._step)
             interrupted = signals.received is not None
-            if interrupted or self._step % settings.steps_per_checkpoint == 0 or self._step == settings.steps:
-                self._write_checkpoint()
+            if interrupted or self._done % settings.steps_per_checkpoint == 0 or self._step == last:
+                checkpoint = self._write_checkpoint()
             if interrupted:
                 raise RunInterrupted(
                     signals.received,
-                    f"Interrupted at step {self._step} of {settings.steps}; a checkpoint is written. Continue with the "
-                    "same command and --resume.",
+                    f"Interrupted at step {self._step} of {self._stages[-1].last_step}; a checkpoint is written. "
+                    "Continue with the same command and --resume.",
                 )
-            self._progress.update(self._step)
+            progress.update(self._step)
+        return checkpoint
 
     def _timed_steps(self, steps):
         # Take some steps and return how many to take before signals are looked at again.
@@ -407,20 +397,20 @@ class Recorder:
         self._energies.write(
             self._step,
             (
-                self._step * self._settings.time_step,
+                self._stage.time(self._step),
                 *energy_cells(self._filaments, positions, stretching, bending, self._kT, growth),
             ),
         )
         if self._filaments.linkers:
             rows, records = measure_linkers(self._filaments, context, self._step)
             for number, row in enumerate(rows):
-                self._linkers.write(self._step, (self._step * self._settings.time_step, number, *row))
+                self._linkers.write(self._step, (self._stage.time(self._step), number, *row))
             self._places.write(records)
-        if any(self._has_forces):
-            time, walls, contacts = self._step * self._settings.time_step, wall_forces(context), contact_forces(context)
-            self._forces.write(self._step, time, walls, contacts, self._filaments)
+        if any(self._rows.there):
+            time, walls, contacts = self._stage.time(self._step), wall_forces(context), contact_forces(context)
+            self._forces.write_rows(self._step, time, *self._rows.of(walls, contacts, self._filaments))
         for row in rows_of_growth(growth):
-            self._growth.write(self._step, (self._step * self._settings.time_step, *row))
+            self._growth.write(self._step, (self._stage.time(self._step), *row))
         for row in self._moving.rows(self._step, positions):
             self._pulling.write(self._step, row)
 
@@ -459,21 +449,21 @@ class Recorder:
 
     def _write_checkpoint(self):
         size, header = self._trajectory.synchronise()
-        self._directory.write_checkpoint(
-            Checkpoint(
-                step=self._step,
-                engine=self._filaments.engine,
-                trajectory_size=size,
-                trajectory_header=header,
-                energies_size=self._energies.synchronise(),
-                linkers_size=self._linkers.synchronise() if self._filaments.linkers else 0,
-                linker_records=self._places.synchronise() if self._filaments.linkers else 0,
-                pulling_size=self._pulling.synchronise() if self._moving else 0,
-                force_sizes=self._forces.synchronise(),
-                growth_size=self._growth.synchronise() if self._grows else 0,
-                state=self._simulation.context.createCheckpoint(),
-            )
+        checkpoint = Checkpoint(
+            step=self._step,
+            engine=self._filaments.engine,
+            trajectory_size=size,
+            trajectory_header=header,
+            energies_size=self._energies.synchronise(),
+            linkers_size=self._linkers.synchronise() if self._filaments.linkers else 0,
+            linker_records=self._places.synchronise() if self._filaments.linkers else 0,
+            pulling_size=self._pulling.synchronise() if self._moving else 0,
+            force_sizes=self._forces.synchronise(),
+            growth_size=self._growth.synchronise() if self._grows else 0,
+            state=self._simulation.context.createCheckpoint(),
         )
+        self._directory.write_checkpoint(checkpoint)
+        return checkpoint
 
 
 def _growth(work, longer):

@@ -4,6 +4,7 @@ import json
 
 from .configuration import TABLES
 from .keys import Text
+from .tables.stages import CHANGES, STAGE
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -20,6 +21,7 @@ def configuration_schema():
         if kind.repeated:
             content = {"type": "array", "items": content, **({"minItems": 1} if kind.required else {})}
         properties[kind.name] = content
+    properties[STAGE.name] = {"type": "array", "items": {"$ref": "#/$defs/stage"}, "minItems": 1}
     return {
         "$schema": DIALECT,
         "title": "A run of openmm-cylchain",
@@ -27,7 +29,24 @@ def configuration_schema():
         "properties": properties,
         "required": [kind.name for kind in TABLES if kind.required],
         "additionalProperties": False,
+        "$defs": {STAGE.name: _stage()},
     }
+
+
+def _stage():
+    # What its tables change may also be ramps, and of several tables by their names or numbers.
+    content = {"description": STAGE.text, **STAGE.schema()}
+    headers = {kind.name: kind.header for kind in TABLES}
+    for name, keys in CHANGES.items():
+        text = f"What changes of {headers[name]}: {', '.join(keys)}."
+        content["properties"][name] = {"description": text, "type": "object"}
+    content["properties"][STAGE.name] = {
+        "description": "Stages within it, which come one after the other, as often as repeat says.",
+        "type": "array",
+        "items": {"$ref": "#/$defs/stage"},
+        "minItems": 1,
+    }
+    return content
 
 
 def format_schema(schema):

@@ -23,6 +23,7 @@ from ..theory import beam_elements
 from ..units.quantities import thermal_energy
 from .description import loads_of_filaments
 from .silence import silenced_c_library
+from .stages import frame_times
 
 _STRETCHING, _STRETCHING_OF_ELEMENTS = "stretching energy per segment", "stretching energy per element"
 _WORMLIKE = "the same, theory of the wormlike chain (25)"
@@ -92,8 +93,7 @@ def load_trajectory(configuration, directory):
     topology = read_topology(directory.topology, DCDFrames(directory.trajectory).particles)
     with silenced_c_library():
         trajectory = mdtraj.load_dcd(str(directory.trajectory), top=topology)
-    settings = configuration.simulation
-    trajectory.time = np.arange(trajectory.n_frames) * settings.steps_per_report * settings.time_step
+    trajectory.time = frame_times(configuration)[: trajectory.n_frames]
     return trajectory
 
 

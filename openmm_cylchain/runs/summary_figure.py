@@ -26,6 +26,7 @@ from .conformations import Conformations
 from .description import loads_of_filaments
 from .figure_style import FONT_SIZE, legend, legend_below, length_unit
 from .growth_panels import draw_growth
+from .stage_summary import mark_stages
 from .summary import (
     extensions,
     group_labels,
@@ -115,6 +116,7 @@ def _draw(configuration, directory, trajectory, network):
         _draw_tensions(axes[2 + own_row, 1], labels, colours_of_linkers, table)
     if has_forces:
         _draw_forces(axes[-1], configuration, directory, trajectory.time)
+    mark_stages(axes.flat, configuration, low=axes[1, 1] if network else axes[0, 1])
     for axis in axes.flat:
         axis.title.set_fontsize(FONT_SIZE + 1)
         axis.xaxis.label.set_fontsize(FONT_SIZE)
@@ -198,9 +200,10 @@ def _draw_forces(axes, configuration, directory, times):
     if configuration.walls:
         table = read_reports(directory.wall_forces)
         time, loads = table["time (ms)"][1:, 0] * MILLISECOND / length, table["load (pN)"][1:]
+        walls = {own.number: own for own in configuration.walls}
         faces = zip(table["wall"][0].astype(int), table["face"][0].astype(int))
         for number, (wall, face) in enumerate(faces):
-            label = _face_label(configuration.walls[wall], wall, face)
+            label = _face_label(walls[wall], wall, face)
             axes[0].plot(time, loads[:, number], color=_COLOURS[number % len(_COLOURS)], linewidth=1.2, label=label)
     if configuration.contacts:
         table = read_reports(directory.contact_forces)

@@ -10,8 +10,10 @@ from ..output.files import write_atomically
 from ..output.run_tables import MILLISECOND
 from ..units.text import format_time, format_with_error
 from ..version import __version__
+from .stages import stages_of
 from .summary import AGREEMENT_FRACTION, AGREEMENT_SIGMA, NOT_COMPARABLE
 
+_STAGES_IN_TABLE, _MOST_STAGES = 4, 12
 _EXPLANATIONS = {
     "agrees": f"agrees: within {AGREEMENT_SIGMA:g} standard errors.",
     f"within {100 * AGREEMENT_FRACTION:.0f} %": (
@@ -23,7 +25,7 @@ _EXPLANATIONS = {
 }
 
 
-def write_summary(configuration, directory, groups, linkers=(), measures=(), growth=(), population=None):
+def write_summary(configuration, directory, groups, linkers=(), measures=(), growth=(), population=None, stages=()):
     """Write the summary as JSON into the directory of the run."""
     settings = configuration.simulation
     content = {
@@ -34,14 +36,21 @@ def write_summary(configuration, directory, groups, linkers=(), measures=(), gro
         "scheme": settings.scheme,
         "temperature (K)": configuration.solvent.temperature,
         "time step (ms)": settings.time_step / MILLISECOND,
-        "simulated time (ms)": settings.steps * settings.time_step / MILLISECOND,
+        "simulated time (ms)": stages_of(configuration)[-1].end / MILLISECOND,
         "groups": [asdict(group) for group in groups],
         **({"linkers": [asdict(own) for own in linkers]} if linkers else {}),
         **({"measures": [asdict(own) for own in measures]} if measures else {}),
         **({"growth": [asdict(own) for own in growth]} if growth else {}),
         **({"population": asdict(population)} if population else {}),
+        **({"stages": [_of_stage(own) for own in stages]} if stages else {}),
     }
     write_atomically(directory.summary, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
+
+
+def _of_stage(stage):
+    # A standard error of NaN is none.
+    values = {name: [mean, error if math.isfinite(error) else None] for name, (mean, error) in stage.values.items()}
+    return {"name": stage.name, "begin (ms)": stage.begin, "end (ms)": stage.end, "values": values}
 
 
 def _rounded(value, digits):
@@ -50,13 +59,15 @@ def _rounded(value, digits):
     return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e9 else text
 
 
-def format_summary(configuration, groups, linkers=(), measures=(), growth=(), population=None):
+def format_summary(configuration, groups, linkers=(), measures=(), growth=(), population=None, stages=()):
     """The summary as text for a terminal: what is compared with theory, averages of what is not, and measures."""
     settings = configuration.simulation
     lines = [
-        f"{configuration.title or 'Run'}: {format_time(settings.steps * settings.time_step)} in steps of "
-        f"{format_time(settings.time_step)}, scheme {settings.scheme}"
+        f"{configuration.title or 'Run'}: {format_time(stages_of(configuration)[-1].end)} in steps of "
+        f"{_time_steps(configuration)}, scheme {settings.scheme}"
     ]
+    if stages:
+        lines += ["", *_table_of_stages(stages)]
     if measures:
         lines += ["", *_table_of_measures(measures)]
     if linkers:
@@ -83,6 +94,33 @@ def format_summary(configuration, groups, linkers=(), measures=(), growth=(), po
     verdicts = {observable.verdict for group in groups for observable in group.observables}
     lines += ["", *(text for verdict, text in _EXPLANATIONS.items() if verdict in verdicts)]
     return "\n".join(lines).rstrip()
+
+
+def _time_steps(configuration):
+    every = (own.configuration.simulation.time_step for own in stages_of(configuration))
+    return " and ".join(dict.fromkeys(map(format_time, every)))
+
+
+def _mean_of_stage(value):
+    if value is None:
+        return "-"
+    return _with_error(value[0], value[1] if math.isfinite(value[1]) else None)
+
+
+def _table_of_stages(stages):
+    # Values below each other, stages side by side in tables of a few.
+    for begin in range(0, len(stages), _STAGES_IN_TABLE):
+        own = stages[begin : begin + _STAGES_IN_TABLE]
+        names = list(dict.fromkeys(name for one in own for name in one.values))
+        rows = [("", *(one.name for one in own))]
+        rows.append(("from (ms)", *(f"{one.begin:.6g}" for one in own)))
+        rows += [(name, *(_mean_of_stage(one.values.get(name)) for one in own)) for name in names]
+        yield from _aligned(rows, (0,))
+        yield ""
+        if begin + _STAGES_IN_TABLE >= _MOST_STAGES < len(stages):
+            yield f"  {len(stages) - _MOST_STAGES} more stages are in the file of the summary."
+            break
+    yield "  Means over the last half of each stage; what is compared below is of the last stage."
 
 
 def _notes(groups):

@@ -5,7 +5,10 @@ import re
 from dataclasses import dataclass
 
 from ..errors import InputError
-from .keys import REQUIRED, ConfigurationError, Key, Place, close_match
+from .keys import REQUIRED, ConfigurationError, Flag, Key, Place, close_match
+
+ACTIVE = Key("active", Flag("false"), True, "Whether it is there; a `[[stage]]` can change that.")
+"""A key of tables that may be there in some stages of a run alone."""
 
 
 class UnknownKeyError(ConfigurationError):

@@ -145,6 +145,27 @@ class AddedFilaments:
         points = shapes.straight(filament_type, segments, start, direction, label)
         return self._add(filament_type, points, label, False, options)
 
+    def set_aside(self, filament: int) -> None:
+        """Have a filament take no part: it stands still but for its first node, and no linkers bind to it.
+
+        So a filament comes, or goes, while an experiment goes on: in another System it takes part, and a Context of
+        that goes on from one of this (``FilamentsInContext.go_on_from``). Contacts and walls are for the others if they
+        are given ``FilamentsThatTakePart(filaments)``.
+
+        Parameters
+        ----------
+        filament : int
+            Its number. It must not grow.
+        """
+        number = whole_number(filament, 0, "filament")
+        own = self[number]
+        if own.growth is not None:
+            raise InputError(f"Filament {number} grows: it cannot stand aside. Begin it by a Nucleation.")
+        # Engines want a node that is free.
+        nodes = tuple(range(1, len(own.positions)))
+        tangents = () if own.control_points is None else nodes
+        self._filaments[number] = replace(own, clamped=nodes, clamped_tangents=tangents, takes_part=False)
+
     def add_nodes(
         self,
         filament_type: ChainType,

@@ -35,11 +35,13 @@ from ..units.quantities import (
     STIFFNESS,
     in_units_of,
     positive,
+    require_kind,
     vector,
     whole_number,
     whole_numbers,
 )
 from ..units.types import Indices, Scalar, Vector, Vectors
+from .carried_state import carry_state
 
 
 class FilamentsInContext:
@@ -103,6 +105,31 @@ class FilamentsInContext:
     def _refuse_if_none_grows(self):
         if not any(filament.growth is not None for filament in self._placed.filaments):
             raise InputError("No filaments grow: give some a growth when they are added.")
+
+    def go_on_from(self, context: openmm.Context) -> None:
+        """Bring this Context into the state of one of the same filaments in another System.
+
+        So an experiment goes on with other forces, rates or a step that an integrator does not change: make filaments
+        anew with other numbers, build them, and go on from the Context before. Positions, time, how far filaments have
+        grown, where linkers are, and the count of steps, by which noise is drawn, are those of that Context; flow,
+        crosslinks and tethers are of this one. Where nothing else has changed, steps go on as if nothing had happened,
+        to the bit, if both integrators have the same seed.
+
+        Parameters
+        ----------
+        context : openmm.Context
+
+        Raises
+        ------
+        InputError
+            If the two Systems have not as many particles, or the linkers or the growth of that Context do not fit.
+
+        Examples
+        --------
+        >>> stopped.in_context(later.context).go_on_from(simulation.context)  # doctest: +SKIP
+        """
+        require_kind(context, openmm.Context, "context")
+        carry_state(context, self._context)
 
     def linkers(self) -> LinkerTable:
         """The linkers that there are, and where they are bound: a LinkerTable.

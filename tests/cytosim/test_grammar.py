@@ -125,17 +125,43 @@ def test_runs_between_which_nothing_happens_are_one(tmp_path):
     assert script.steps == 300
 
 
-def test_the_longest_run_is_taken_with_what_is_there_when_it_begins(tmp_path):
-    script = script_of(
-        tmp_path,
-        "set fiber actin { rigidity = 1 }\nnew actin\nrun 10 system\nchange actin { rigidity = 2 }\nnew actin\n"
-        "run 100 system\ndelete all actin\nchange actin { rigidity = 3 }\nrun 20 system\nchange actin { rigidity = 4 }",
-    )
-    assert script.steps == 100
-    assert script.properties["actin"].settings.number("rigidity") == 2.0
-    assert len([own for own in script.created if own.name == "actin"]) == 2
-    said = [text for _, text in script.stages]
-    assert said[1:] == ["change actin", "new actin", "delete all actin", "change actin"]
+PARTS = (
+    "set fiber actin { rigidity = 1 }\nset hand grip { binding = 1, 0.1 }\n"
+    "set couple link { hand1 = grip; hand2 = grip }\nnew actin\nrun 10 system\n"
+    "delete 1 actin\nchange actin { rigidity = 2 }\nnew actin\nnew 5 link\nrun 100 system { nb_frames = 2 }\n"
+    "change system { time_step = 0.02 }\nnew 4 link { mark = 1 }\nrun 50 system\nreport fiber x\nrun 25 system\n"
+    "delete 2 link\nrun 60 system\ndelete link { mark = 1 }\ndelete link { state1 = 0 }\nrun 70 system\n"
+    "cut actin { plane = 1 0 0, 0 }\nrun 20 system\n"
+)
+
+
+def test_runs_are_stages_and_apart_where_fibers_come_or_are_cut(tmp_path):
+    script = script_of(tmp_path, PARTS)
+    every = [script, *script.later]
+    assert [own.steps for own in every] == [100, 75, 60, 70]
+    assert [own.time_step for own in every] == [0.01, 0.02, 0.02, 0.02]
+    assert script.duration == pytest.approx(0.01 * 100 + 0.02 * (75 + 60 + 70))
+    assert [own.frames for own in every] == [2, 0, 0, 0]
+    links = [sum(new.count for new in own.created if new.name == "link") for own in every]
+    # Of those with the mark, the ones that were left; first those that came first.
+    assert links == [5, 9, 7, 3]
+    assert [own.unbound for own in every] == [{}, {}, {}, {"link": {"state1"}}]
+    assert [needs for *_, needs in script.stages] == ["stages: filaments that go, are cut, or come and grow"] * 2
+    assert [text for _, text, _ in script.stages] == [
+        "10 steps of other runs, apart by delete 1 actin",
+        "20 steps of other runs, apart by cut actin",
+    ]
+
+
+def test_what_goes_by_where_it_is_is_left_out(tmp_path):
+    script = script_of(tmp_path, PARTS.replace("{ state1 = 0 }", "{ position = inside, box }"))
+    assert ("stages: linkers that go by where or how they are") in [needs for *_, needs in script.stages]
+
+
+def test_hundreds_of_runs_are_read_at_once(tmp_path):
+    text = "set fiber actin { rigidity = 1 }\nnew actin\nrun 5 system\n"
+    text += "repeat 300 { change actin { rigidity = 2 }\nrun 1 system }"
+    assert len(script_of(tmp_path, text).later) == 300
 
 
 def test_settings_know_what_nobody_asked_for():

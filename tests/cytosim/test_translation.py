@@ -384,6 +384,11 @@ def test_events_begin_fibers(tmp_path):
     assert group.nucleation.rate == pytest.approx(3 / SECOND)
     assert group.nucleation.length == pytest.approx(500, rel=0.02)
     assert document.missing == []
+    # The same in a run.
+    code = "( new tube { length = 0.5; plus_end = grow; position = ball 2; } )"
+    found, document = translated(tmp_path, own, run=f"run 1000 system {{ event = 3, {code} }}\n")
+    assert found.filaments[-1].nucleation.rate == pytest.approx(3 / SECOND)
+    assert document.missing == []
     _, document = translated(tmp_path, TUBE + "new tube\nnew event { rate = 3; code = ( delete 1 tube ) }\n")
     assert document.missing == ["events during a run"]
     _, document = translated(tmp_path, TUBE + "new tube\nnew event { delay = 3; code = (report fiber x.txt {a=1}) }\n")
@@ -425,10 +430,126 @@ def test_two_dimensions_are_found(tmp_path):
     assert found.filaments[0].planar and not any("--dimensions" in note.text for note in document.notes)
 
 
-def test_stages_and_bodies_are_said(tmp_path):
-    text = TUBE + "new tube\nset bead ball { confine = off }\nnew 3 ball { radius = 1 }\nrun 5000 system\nnew tube\n"
+def test_parts_and_bodies_are_said(tmp_path):
+    text = TUBE + "new tube\nset bead ball { confine = off }\nnew 3 ball { radius = 1 }\nrun 5000 system\ndelete tube\n"
+    text += "new tube\n"
     _, document = translated(tmp_path, text)
-    assert document.missing == ["stages: what changes between runs", "bodies: beads"]
+    assert document.missing == ["stages: filaments that go, are cut, or come and grow", "bodies: beads"]
+
+
+def test_runs_become_stages(tmp_path):
+    """What ``change``, ``new`` and ``delete`` between runs say, in the configurations of stages."""
+    tube = TUBE.replace("segmentation", "confine = inside, 100; segmentation")
+    link = COUPLE.replace("couple link", "couple other")
+    text = (
+        tube
+        + HAND
+        + COUPLE
+        + link
+        + (
+            "new 4 tube { length = 3 }\nnew 50 link\nrun 100 system { nb_frames = 10 }\n"
+            "new 30 link { attach1 = tube }\nchange motor { speed = 0; unbinding = 0.6, inf }\n"
+            "run 200 system { nb_frames = 4 }\n"
+            "change cell { radius = 3.8 }\nchange tube { rigidity = 10 }\ndelete 20 link\nnew 10 other\n"
+            "change system { time_step = 0.0005; viscosity = 1 }\n"
+        )
+    )
+    found, document = translated(tmp_path, text, run="run 400 system { nb_frames = 4 }\n")
+    assert document.missing == []
+    own = [stage.configuration for stage in found.stages]
+    assert [stage.name for stage in found.stages] == ["run 1", "run 2", "run 3"]
+    assert [one.simulation.steps for one in own] == [100, 200, 400]
+    assert [one.simulation.steps_per_report for one in own] == [10, 50, 100]
+    assert [one.simulation.time_step for one in own] == [1e9, 1e9, 5e8]
+    assert [one.linkers[0].count for one in own] == [50, 80, 60]
+    assert [one.linkers[1].count for one in own] == [0, 0, 10]
+    assert [sorted(stage.bound) for stage in found.stages] == [[], [0], []]
+    assert own[1].linkers[0].bound == 30
+    hands = [one.linkers[0].kind.hands[0] for one in own]
+    assert [hand.speed * SECOND / MICROMETER for hand in hands] == pytest.approx([0.8, 0.0, 0.0])
+    assert [hand.unbinding_rate * SECOND for hand in hands] == pytest.approx([0.3, 0.6, 0.6])
+    # No force speeds up unbinding any more.
+    assert hands[1].unbinding_force > 1e5 * hands[0].unbinding_force
+    assert [one.walls[0].shape.radius for one in own] == [4000.0, 4000.0, 3800.0]
+    volumes = np.array([one.linkers[0].volume for one in own])
+    assert volumes / volumes[0] == pytest.approx([1.0, 1.0, (3.8 / 4) ** 3])
+    rigidities = np.array([one.filaments[0].type.bending_rigidity for one in own])
+    assert rigidities / rigidities[0] == pytest.approx([1.0, 1.0, 0.5])
+    assert own[2].solvent.viscosity == pytest.approx(2.0 * own[0].solvent.viscosity)
+
+
+def test_links_confinement_and_steric_come_and_go(tmp_path):
+    hold = "set hand hold { binding = 10, 0.05; unbinding = 0, inf }\n"
+    link = "set couple bond { hand1 = hold; hand2 = hold; stiffness = 100 }\n"
+    text = (
+        TUBE
+        + hold
+        + link
+        + (
+            "new 2 tube { length = 3; position = 0 0 0; direction = 1 0 0; placement = off }\nrun 100 system\n"
+            "new bond { attach1 = fiber1, 0; attach2 = fiber2, 0 }\nchange tube { confine = inside, 100 }\n"
+            "run 100 system\n"
+            "change tube { confine = off }\nchange bond { stiffness = 200 }\n"
+        )
+    )
+    found, document = translated(tmp_path, text)
+    assert document.missing == []
+    own = [stage.configuration for stage in found.stages]
+    assert [len(one.links) for one in own] == [0, 1, 1]
+    assert own[2].links[0].stiffness == pytest.approx(2.0 * own[1].links[0].stiffness)
+    assert [len(one.walls) for one in own] == [0, 1, 0]
+
+
+def test_fibers_come_with_a_run(tmp_path):
+    """Those with places in a line and those with places in a file, and a couple that joins two of them then."""
+    hold = "set hand hold { binding = 10, 0.05; unbinding = 0, inf }\n"
+    link = "set couple bond { hand1 = hold; hand2 = hold; stiffness = 100 }\n"
+    shape = "shape = 0 0 0, 1 0 0, 1.5 0.5 0; placement = off"
+    text = (
+        TUBE
+        + hold
+        + link
+        + (
+            f"new 2 tube {{ length = 3 }}\nnew tube {{ {shape} }}\nrun 100 system\n"
+            f"new tube {{ {shape} }}\nrun 50 system\n"
+            "new 3 tube { length = 2 }\nnew bond { attach1 = fiber1, 0; attach2 = fiber4, 0.5 }\n"
+        )
+    )
+    found, document = translated(tmp_path, text)
+    assert document.missing == []
+    every = [stage.configuration for stage in found.stages]
+    assert [[group.count for group in own.filaments if group.active] for own in every] == [
+        [2, 1],
+        [2, 1, 1],
+        [2, 1, 1, 3],
+    ]
+    assert [len(own.links) for own in every] == [0, 0, 1]
+    assert [place["filament"] for place in every[2].links[0].between] == [0, 3]
+
+
+def test_the_last_fiber_is_that_of_its_time(tmp_path):
+    hold = "set hand hold { binding = 10, 0.05; unbinding = 0, inf }\n"
+    link = "set couple bond { hand1 = hold; hand2 = hold; stiffness = 100 }\n"
+    bond = "new bond { attach1 = fiber1, 0; attach2 = last, 0.5 }\n"
+    tube = "new tube { length = 3 }\n"
+    found, document = translated(tmp_path, TUBE + hold + link + tube + tube + bond + "run 10 system\n" + tube + bond)
+    assert document.missing == []
+    links = found.stages[1].configuration.links
+    assert [own.between[1]["filament"] for own in links] == [1, 2]
+
+
+def test_fibers_that_grow_do_not_come_with_a_run(tmp_path):
+    text = TUBE.replace("segmentation", "activity = grow; growing_speed = 0.1; segmentation")
+    found, document = translated(tmp_path, text + "new tube\nrun 5 system\nnew tube\n")
+    assert not found.stages
+    assert document.missing == ["stages: filaments that go, are cut, or come and grow"]
+
+
+def test_what_a_stage_cannot_change_is_said(tmp_path):
+    text = TUBE + "new tube { length = 3 }\nrun 100 system\nchange tube { segmentation = 0.25 }\n"
+    found, document = translated(tmp_path, text)
+    assert len(found.stages) == 2
+    assert document.missing == ["stages: another segment_length", "stages: another segments"]
 
 
 def test_fibers_begin_where_they_are_told_to(tmp_path):

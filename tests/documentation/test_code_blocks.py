@@ -73,10 +73,38 @@ solvent.temperature = ["310 K"]
 ''')
 """
 )
+# A run of two stages.
+STAGED = """
+from pathlib import Path
+from openmm_cylchain import cli
+Path("staged.toml").write_text('''
+[solvent]
+temperature = "310 K"
+viscosity = "1.71 mPa*s"
+[[filament]]
+type = "F_ACTIN"
+segments = 8
+count = 4
+[[linkers]]
+type = "ALPHA_ACTININ"
+count = 10
+volume = "1 um^3"
+[simulation]
+time_step = "10 ns"
+report_interval = "100 ns"
+[[stage]]
+duration = "0.5 us"
+[[stage]]
+duration = "0.5 us"
+linkers.count = 20
+''')
+assert cli.main(["run", "staged.toml", "--output", "staged"]) == 0
+"""
 # What a page takes as given, by the page and the beginning of the block before which it runs.
 GIVEN = {
     ("docs/guide.md", "from openmm_cylchain import analysis"): RUN.replace("DIRECTORY", "output_f_actin"),
     ("docs/pictures.md", "from openmm_cylchain import analysis"): RUN.replace("DIRECTORY", "motor_network"),
+    ("docs/stages.md", "from openmm_cylchain import analysis"): STAGED,
     ("docs/scans.md", "from concurrent.futures"): SCAN,
     ("docs/time_step.md", "step = filaments"): BUILT,
     ("docs/walls.md", "from openmm import unit"): BUILT,

@@ -34,6 +34,7 @@ def test_new_configurations_run(tmp_path, kind, monkeypatch, capsys):
     short = re.sub(r"(?m)^duration = .*$", f'duration = "{2 * few!r} ps"', text)
     short = re.sub(r"(?m)^report_interval = .*$", f'report_interval = "{few!r} ps"', short)
     short = re.sub(r"(?m)^time_step = .*$", f'time_step = "{settings.time_step!r} ps"', short)
+    short = re.sub(r"(?m)^pieces = \d+", "pieces = 2", short)
     assert few <= report
     (tmp_path / "short.toml").write_text(short)
     assert main(["run", "short.toml", "--output", "out"]) == 0

@@ -6,6 +6,7 @@
 import json
 import multiprocessing
 import os
+import re
 import signal
 import time
 
@@ -16,6 +17,7 @@ from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.run import run
 from support import small_runs
 from support.configurations import COMING_AND_GOING
+from support.staged_runs import MANY_CHANGES
 
 # Many checkpoints, so that kills fall into writing them, too.
 NETWORK = small_runs.NETWORK.replace(
@@ -28,6 +30,8 @@ GROWING = COMING_AND_GOING.replace(
 )
 FILES = ("trajectory.dcd", "energies.csv", "linkers.csv", "linkers.npy", "description.json", "topology.cif")
 OF_GROWING = ("growth.csv", "wall_forces.csv", "contact_forces.csv", "checkpoint.chk")
+STAGED = re.sub(r'(?m)^duration = "(.*) ms"', lambda match: f'duration = "{6 * float(match[1]):g} ms"', MANY_CHANGES)
+OF_STAGES = ("pulling.csv", "wall_forces.csv", "crosslinks.npy", "checkpoint.chk")
 KILLS = int(os.environ.get("OPENMM_CYLCHAIN_TEST_KILLS", "3"))
 
 
@@ -63,8 +67,8 @@ def started(processes, configuration, output):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "steps", "files"),
-    [(NETWORK, 1600, FILES), (GROWING, 1000, FILES + OF_GROWING)],
-    ids=["linked", "growing"],
+    [(NETWORK, 1600, FILES), (GROWING, 1000, FILES + OF_GROWING), (STAGED, 1680, FILES + OF_STAGES)],
+    ids=["linked", "growing", "staged"],
 )
 def test_network_that_is_killed_at_random_moments(text, steps, files, tmp_path, processes):
     """Counted are kills of what has written a checkpoint and is not at its last step; others come on top."""

@@ -10,6 +10,7 @@ from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.keys import ConfigurationError
 from openmm_cylchain.runs.moving_tethers import MovingTethers
 from openmm_cylchain.runs.run import create_simulation
+from openmm_cylchain.runs.stages import stages_of
 from support.small_runs import simulated
 
 PULLED = """
@@ -58,7 +59,7 @@ def test_points_forces_and_extensions(pulled):
     # 1 um/s is 1e-9 nm/ps; an interval of the points' motion before the report.
     configuration = parse_configuration(PULLED)
     simulation, built = create_simulation(configuration)
-    moving = MovingTethers(configuration, built.filaments)
+    moving = MovingTethers(stages_of(configuration)[0], built.filaments)
     steps = moving.interval
     width = np.sqrt(0.0083144626 * 310.0 / (0.05 * 0.602214))
     assert 0.025 * width < 5e-7 * 2e3 * steps <= 0.05 * width
@@ -80,7 +81,7 @@ def test_the_same_from_python(pulled):
     """Filaments go where ConstantVelocityPulling brings them."""
     configuration = parse_configuration(PULLED)
     simulation, built = create_simulation(configuration)
-    steps = MovingTethers(configuration, built.filaments).interval
+    steps = MovingTethers(stages_of(configuration)[0], built.filaments).interval
     velocity = [[4e-7, 3e-7, 0.0]] * 2
     pulling = ConstantVelocityPulling(None, steps, built.filaments, [0, 1], velocity, start_time=2e6)
     simulation.context.setPositions(built.positions)

@@ -32,7 +32,7 @@ def outcomes(seed, count):
 
 
 def test_mutated_configurations():
-    found = outcomes(0, 100)
+    found = outcomes(0, 150)
     assert found["refused"] > 40 and found["runs"] > 6
 
 

@@ -14,6 +14,7 @@ from openmm_cylchain.runs.reference import reference_page
 from openmm_cylchain.runs.schema import configuration_schema, format_schema
 from support.configurations import BEAMS, COMING_AND_GOING, ENDS, EVERYTHING, GROWING
 from support.repository import EXAMPLES, ROOT
+from support.staged_runs import MANY_CHANGES
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -29,6 +30,7 @@ FILES = [
     GROWING,
     COMING_AND_GOING,
     ENDS,
+    MANY_CHANGES,
 ]
 
 
@@ -55,7 +57,7 @@ def test_files_are_valid(text):
 
 
 def test_everything_has_every_table_and_the_examples_are_there():
-    assert len(FILES) == 14
+    assert len(FILES) == 16
     # Joints are between filaments of beam elements.
     tables = {table for text in (EVERYTHING, BEAMS, GROWING, COMING_AND_GOING) for table in tomllib.loads(text)}
     assert all(kind.name in tables for kind in TABLES)
@@ -95,6 +97,9 @@ def test_everything_has_every_table_and_the_examples_are_there():
         ("threads = 1", "threads = 0", "$.simulation.threads"),
         ("seed = 2", "sed = 2", "$.simulation"),
         ('time_step = "10 us"', "time_step = 10", "$.simulation.time_step"),
+        ('duration = "2 ms"', "[[stage]]\nduration = 2\n[tmp]", "$.stage[0].duration"),
+        ('duration = "2 ms"', "[[stage]]\nsolvents.temperature = '1 K'\n[tmp]", "$.stage[0]"),
+        ('duration = "2 ms"', "[[stage]]\n[[stage.stage]]\nrepeat = 0\n[tmp]", "$.stage[0].stage[0].repeat"),
     ],
 )
 def test_mistakes_are_seen(old, new, where):

@@ -1,5 +1,7 @@
 """What cannot run is refused in words before it begins, and what can run does."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import openmm
 import pytest
@@ -13,6 +15,7 @@ from openmm_cylchain.runs.initial_state import build_system
 from openmm_cylchain.runs.keys import Place
 from openmm_cylchain.runs.run import begin, check_step, create_simulation
 from openmm_cylchain.runs.run_directory import RunDirectory
+from openmm_cylchain.runs.stages import stages_of
 from openmm_cylchain.runs.summarised_run import run_with_summary
 from openmm_cylchain.runs.tables.shapes import REGION, Region
 from support.run_figures import rendered
@@ -214,9 +217,13 @@ def test_a_dry_run_counts_steps_reports_checkpoints_and_motions_of_tethers(tmp_p
             recorder = runs.Recorder
             costs = (app.Simulation, "step", 1e-3), (recorder, "_report", 0.1), (recorder, "_write_checkpoint", 1.0)
             clock = Clock(patch, (*costs, (runs.MovingTethers, "move", 0.02)))
-            own = recorder(configuration, built.filaments, simulation, RunDirectory(tmp_path), None)
-            result = getattr(own, way)(*(() if way == "run_to_end" else (3.0,)))
-            took.append(clock.now if result is None else result[1])
+            (stage,) = stages_of(configuration)
+            own = recorder(stage, built.filaments, simulation, RunDirectory(tmp_path), None)
+            if way == "run_to_end":
+                own.run_to_end(SimpleNamespace(received=None), SimpleNamespace(update=lambda step: None))
+                took.append(clock.now)
+            else:
+                took.append(own.seconds_of_run(3.0)[1])
     assert 0.9 < took[1] / took[0] < 1.1
 
 

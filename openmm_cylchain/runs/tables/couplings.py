@@ -19,7 +19,7 @@ from ..keys import (
     direction,
     point,
 )
-from ..table import TableKind
+from ..table import ACTIVE, TableKind
 from .shapes import SHAPE_KEYS, read_shape
 
 CONTACTS = TableKind(
@@ -39,6 +39,7 @@ CONTACTS = TableKind(
             True,
             "Whether filaments that are drawn on top of each other come apart before the run.",
         ),
+        ACTIVE,
     ),
     "Filaments do not pass through each other: their segments are capsules, see `capsule_contact_force`. [[particles]] "
     "with a diameter take part as spheres.",
@@ -55,6 +56,7 @@ WALL = TableKind(
             0.0,
             "That axes of filaments keep from the wall, such as their radius.",
         ),
+        ACTIVE,
     ),
     "A wall around all filaments and particles, see `filament_wall_force`.",
     repeated=True,
@@ -90,6 +92,7 @@ TETHER = TableKind(
             "Velocity at which the point moves; `pulling.csv` has its force at every report.",
         ),
         Key("start_time", Quantity(units.TIME, "zero"), 0.0, "Time until which the point stays where it begins."),
+        ACTIVE,
     ),
     "A spring from a node of a filament to a point, such as an optical trap, see `Filaments.add_tether`. The point may "
     "move at a constant velocity.",
@@ -109,6 +112,7 @@ PULL = TableKind(
         Key("direction", direction(), (1.0, 0.0, 0.0), "Direction of the tension on the last node."),
         Key("node", Whole(-(10**9), 10**9, "-1"), None, "Node on which the force acts."),
         Key("force", Triple(Quantity(units.FORCE, "any"), '["1 pN", "0 pN", "0 pN"]'), None, "Force on that node."),
+        ACTIVE,
     ),
     "Constant forces: a tension, or a force on one node of each filament.",
     repeated=True,
@@ -151,6 +155,7 @@ LINK = TableKind(
         ),
         Key("model", Choice(("harmonic", "fene")), "harmonic", "Energy of the spring."),
         Key("maximum_extension", Quantity(units.LENGTH), None, "Largest extension of a FENE spring."),
+        ACTIVE,
     ),
     "Springs that stay: one between two places, or random ones between filaments, see `Crosslinks`.",
     repeated=True,
@@ -169,16 +174,20 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Wall:
-    """A [[wall]] table; the distance in nm."""
+    """A [[wall]] table, whose number is counted from 0; the distance in nm."""
 
     shape: object
     stiffness: float
     distance: float
+    number: int = 0
 
 
 @dataclass(frozen=True)
 class TetherGroup:
-    """A [[tether]] table: a node of each of some filaments; the point in nm, or None; velocity in nm/ps, or None."""
+    """A [[tether]] table, whose number is counted from 0: a node of each of some filaments.
+
+    The point is in nm, or None; the velocity in nm/ps, or None.
+    """
 
     filaments: tuple
     node: int
@@ -186,6 +195,7 @@ class TetherGroup:
     stiffness: float
     velocity: tuple | None
     start_time: float
+    number: int = 0
 
 
 @dataclass(frozen=True)
@@ -222,7 +232,7 @@ def read_contacts(entries, groups):
             f"is {entries['diameter']:g} nm, but filaments are {thinnest:g} nm thick: they touch at their diameter, or "
             "further apart."
         )
-    return Contacts(**entries.values)
+    return Contacts(*(entries[name] for name in ("diameter", "stiffness", "excluded_neighbors", "relax")))
 
 
 def read_wall(entries):
@@ -230,7 +240,7 @@ def read_wall(entries):
     shape = read_shape(entries)
     if entries["distance"] >= shape.room:
         raise entries.at("distance").error(f"must be below {shape.room:g} nm to fit into the shape.")
-    return Wall(shape, entries["stiffness"], entries["distance"])
+    return Wall(shape, entries["stiffness"], entries["distance"], entries.place.path[1])
 
 
 def read_tether(entries, groups):
@@ -242,7 +252,7 @@ def read_tether(entries, groups):
     if "start_time" in entries:
         entries.require("velocity")
     names = ("node", "point", "stiffness", "velocity", "start_time")
-    return TetherGroup(numbers, *(entries[name] for name in names))
+    return TetherGroup(numbers, *(entries[name] for name in names), entries.place.path[1])
 
 
 def read_pull(entries, groups):
@@ -273,7 +283,7 @@ def read_link(entries, groups):
         raise entries.error(f'lacks its places: add a line such as between = {_PLACES}, or within = "30 nm".')
     if (entries["model"] == "fene") != ("maximum_extension" in entries):
         raise entries.error('maximum_extension must be given for model = "fene", and only for it.')
-    values = entries.values
+    values = {name: value for name, value in entries.values.items() if name != ACTIVE.name}
     between = None if entries["between"] is None else tuple(place.values for place in entries["between"])
     return LinkGroup(**{**values, "between": between}, label=entries.label)
 

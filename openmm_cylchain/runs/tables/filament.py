@@ -13,7 +13,7 @@ from ...kinetics.nucleation import Nucleation
 from ...units import quantities as units
 from ..keys import Choice, Either, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
 from ..start_files import read_start
-from ..table import TableKind
+from ..table import ACTIVE, TableKind
 from .filament_types import MONOMER_LENGTHS, TYPE_KEYS, read_filament_type
 from .growth import GROWTH, GROWTH_EXAMPLE, SEVERING_EXAMPLE, read_growth
 from .shapes import REGION, REGION_EXAMPLE, Region
@@ -131,6 +131,7 @@ FILAMENT = TableKind(
             None,
             "How many places there are for parts of filaments that are cut, with growth = { severing_rate = ... }.",
         ),
+        ACTIVE,
         Key("file", Text('"start.npz"'), None, "Start from a file: see below."),
         Key("topology", Text('"topology.cif"'), None, "Topology of a file that is a trajectory."),
         Key("frame", Whole(-(10**12), 10**12, "-1"), None, "Which frame of a trajectory; the last one if not given."),
@@ -181,6 +182,7 @@ class FilamentGroup:
     growth: Growth | None = dataclasses.field(default=None, compare=False)
     spare_nodes: int = 0
     own_path: tuple = ()
+    active: bool = True
     nucleation: Nucleation | None = dataclasses.field(default=None, compare=False)
 
     @property
@@ -229,6 +231,9 @@ def read_filaments(entries, table, solvent, box, folder, monomers):
     growth = None if entries["growth"] is None else read_growth(entries["growth"], monomers)
     own = {"planar": True} if entries["planar"] else {}
     common = {"propulsion": entries["propulsion"], "height": entries["height"], "table": table}
+    common["active"] = entries["active"]
+    if growth is not None and not entries["active"]:
+        raise entries.at("active").error("is false, but these filaments grow: let them begin by [[nucleation]].")
     if growth is None:
         entries.refuse(("reserve",), f"belongs to filaments that are cut: add growth = {SEVERING_EXAMPLE}")
     finished = []

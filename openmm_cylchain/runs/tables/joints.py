@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ...units import quantities as units
 from ..keys import REQUIRED, Key, Pair, Quantity, direction
-from ..table import TableKind
+from ..table import ACTIVE, TableKind
 from .couplings import PLACE_KEYS, check_place, group_of
 
 _TANGENT = TableKind(
@@ -29,6 +29,7 @@ JOINT = TableKind(
             None,
             'Between the two, up to "180 deg"; without it, at rest as the run begins.',
         ),
+        ACTIVE,
     ),
     'Moments that hold the angle between two filaments of element = "beam" anywhere along them, or between one and a '
     "direction, see `Joints`. With a [[link]] of rest length zero between the same two places, the two are welded "

@@ -28,7 +28,11 @@ _QUANTITIES = {
     "unbinding_force": (units.FORCE, "positive", "Force at which a hand unbinds e times as fast."),
     "catch_rate": (units.RATE, "zero", "Rate of unbinding of a catch bond without a load; loads slow it down."),
     "catch_force": (units.FORCE, "positive", "Force at which a catch bond unbinds e times as slowly."),
-    "speed": (units.VELOCITY, "any", "Speed of walking towards the last node; negative towards the first."),
+    "speed": (
+        units.VELOCITY,
+        "any",
+        "Speed of walking towards the last node; negative towards the first, zero if it stands.",
+    ),
     "stall_force": (units.FORCE, "positive", "Force at which a hand stands still."),
     "site_spacing": (units.LENGTH, "positive", "Distance of binding sites, each of which holds one hand."),
     "severing_rate": (
@@ -112,6 +116,8 @@ _AT_END = TableKind(
     owner="filament_end of the hand of [[linkers]]",
 )
 
+KEPT = ("all", "bound", "both hands bound")
+"""Linkers that a stage keeps, by how many of their hands are bound at least."""
 HAND = TableKind(
     "hand",
     (
@@ -169,6 +175,12 @@ LINKERS = TableKind(
         ),
         Key("anchors", _Anchors(), None, "Points to which they are tied, one each, in place of their first hands."),
         Key("bound", Whole(0, 10**7, "100"), 0, "How many begin with one hand bound, at random or near anchors."),
+        Key(
+            "keep",
+            Choice(KEPT),
+            "all",
+            "In a `[[stage]]`: which of those that are there stay as it begins. Others go, and come by count alone.",
+        ),
     ),
     "Crosslinkers or motors that bind to filaments, walk along them and unbind; the page on linkers has their laws.",
     repeated=True,
@@ -185,13 +197,14 @@ class LinkerGroup:
     volume: float | None
     anchors: tuple | None
     bound: int
+    keep: str = "all"
 
 
 def read_linkers(entries, groups, box, seed, walls=()):
     """The LinkerGroup of a [[linkers]] table, for FilamentGroups; the seed is that of anchors at random places."""
     anchors = _anchor_points(entries, sum(own.count * own.nodes for own in groups), seed, box, walls)
     names = ("count", "concentration", "volume")
-    group = LinkerGroup(_kind(entries), *(entries[name] for name in names), anchors, entries["bound"])
+    group = LinkerGroup(_kind(entries), *(entries[name] for name in names), anchors, entries["bound"], entries["keep"])
     with entries.naming():
         as_linkers(group.kind, group.count, group.concentration, group.volume, group.anchors, group.bound, 0)
     if group.count is not None and group.volume is None and (box is None or walls):
@@ -296,6 +309,9 @@ def _hand(entries, changed):
         at_end = properties["filament_end"]
         with at_end.naming():
             properties["filament_end"] = HandAtEnd(**at_end.given(*_AT_END.names))
+    if properties.get("speed") == 0.0:
+        # One that stands still, as in a stage with a drug, keeps what it has for when it walks.
+        properties.update(stall_force=None, walks_backward=False)
     with entries.naming():
         try:
             return Hand(**properties) if changed is None else dataclasses.replace(changed, **properties)
@@ -324,13 +340,13 @@ def _random_anchors(entries, seed, box, walls):
         lower, upper = (0.0, 0.0, 0.0) if lower is None else lower, box if upper is None else upper
     if wall is None:
         entries.require("lower", "upper")
-    elif wall > len(walls):
+    elif wall - 1 not in (numbered := {own.number: own for own in walls}):
         raise entries.at("wall").error(f"is {wall}, but there are {len(walls)} [[wall]] tables.")
     if lower is not None and upper is not None and np.any(np.array(lower) > np.array(upper)):
         raise entries.at("upper").error("must not be below lower.")
     if wall is None:
         return np.random.default_rng(seed).uniform(lower, upper, (entries["count"], 3))
     try:
-        return random_points_on(walls[wall - 1].shape, entries["count"], seed, lower, upper)
+        return random_points_on(numbered[wall - 1].shape, entries["count"], seed, lower, upper)
     except InputError as error:
         raise entries.error(f"at random places: {error}") from None

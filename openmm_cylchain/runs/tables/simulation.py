@@ -20,7 +20,12 @@ SIMULATION = TableKind(
     (
         Key("scheme", Choice(tuple(SCHEMES)), None, "The engine's default if not given."),
         Key("time_step", WordOrQuantity(("recommended",), units.TIME), REQUIRED, "See `openmm-cylchain timestep`."),
-        Key("duration", Quantity(units.TIME), REQUIRED, "How long the run is: a whole number of reports."),
+        Key(
+            "duration",
+            Quantity(units.TIME),
+            None,
+            "How long the run is: a whole number of reports. Required, unless `[[stage]]` tables say it.",
+        ),
         Key("report_interval", Quantity(units.TIME), REQUIRED, "From frame to frame: a whole number of steps."),
         Key("checkpoint_interval", Quantity(units.TIME), None, "A whole number of reports; 10 of them if not given."),
         Key("seed", Whole(1, None, "1"), 1, "The same seed gives the same run."),
@@ -71,6 +76,7 @@ def read_seed(entries):
 
 def read_simulation(entries, recommended):
     """The SimulationSettings of a [simulation] table; ``recommended(scheme, engine)`` is the recommended step in ps."""
+    entries.require("duration")
     engine = entries["engine"]
     scheme = entries["scheme"] or default_scheme(engine)
     if "threads" in entries and entries["platform"] != "CPU":

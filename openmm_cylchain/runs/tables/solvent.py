@@ -7,7 +7,7 @@ import numpy as np
 from ...mechanics.flow import Flow
 from ...units import quantities as units
 from ..keys import REQUIRED, Key, Listing, Quantity, Triple, direction, point
-from ..table import TableKind
+from ..table import ACTIVE, TableKind
 
 SOLVENT = TableKind(
     "solvent",
@@ -49,6 +49,7 @@ FLOW = TableKind(
         Key("gradient_direction", direction(), (0.0, 0.0, 1.0), "Direction along which the velocity of shear grows."),
         Key("compression", direction(), (0.0, 1.0, 0.0), "Axis of compression of extension."),
         Key("origin", point(), (0.0, 0.0, 0.0), "Where the velocity is that given, or zero."),
+        ACTIVE,
     ),
     "Flow of the solvent: the sum of what is given. In a periodic box see `Flow`.",
 )

@@ -1,0 +1,38 @@
+"""Lines of tables of forces, of all walls and contacts that there are in some stage of a run."""
+
+from ..couplings.force_reporters import rows_of_contacts, rows_of_walls
+from ..filaments.filaments_that_take_part import FilamentsThatTakePart
+
+_NONE = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class RowsOfForces:
+    """What ``wall_forces.csv`` and ``contact_forces.csv`` have at a report of a stage.
+
+    A wall that is not active, and contacts that are not, have forces of zero, as means over no time; walls have the
+    numbers of their tables, counted from 0.
+
+    Attributes
+    ----------
+    there : (bool, bool)
+        Whether there are walls, and contacts, in some stage.
+    """
+
+    def __init__(self, stages, configuration):
+        self._walls = [own.number for own in configuration.walls]
+        faces = {own.number: len(own.shape.faces) for stage in stages for own in stage.configuration.walls}
+        self._faces = [(number, face) for number in sorted(faces) for face in range(faces[number])]
+        self.there = bool(faces), any(stage.configuration.contacts is not None for stage in stages)
+
+    def of(self, walls, contacts, filaments):
+        """Rows of walls, each with its wall and face, and of contacts; see ``ForceTables.write_rows``."""
+        known = {(self._walls[wall], face): row for (wall, face), row in zip(*rows_of_walls(walls))}
+        rows = [(place, known.get(place, _NONE)) for place in self._faces]
+        if not self.there[1]:
+            return rows, ()
+        forces = [_NONE] * len(filaments)
+        if contacts:
+            present = FilamentsThatTakePart(filaments)
+            for number, row in zip(present.numbers, rows_of_contacts(contacts, present)):
+                forces[number] = row
+        return rows, forces

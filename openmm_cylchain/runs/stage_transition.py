@@ -1,0 +1,98 @@
+"""From a stage of a run to the next one: another System, in the state in which the last one has ended.
+
+Linkers that a stage adds are not bound, unless it says so; of those that it takes away, each has the same chance.
+"""
+
+import functools
+
+import numpy as np
+
+from ..systems.carried_state import carry_state
+from .relaxation import relaxed_again
+from .tables.linkers import KEPT
+
+
+def carry_over(before, after, stage, seed):
+    """Bring the Context of a stage into the state of that of the stage before; see ``carry_state``.
+
+    Parameters
+    ----------
+    before, after : tuple of (app.Simulation, BuiltSystem)
+    stage : Stage
+        The later one.
+    seed : int
+        By which linkers are chosen that are taken away.
+
+    Raises
+    ------
+    InputError
+        If the two Systems have not the same particles.
+    """
+    (old, old_built), (new, built) = before, after
+    generator = np.random.default_rng([seed, stage.number, 6])
+    carry_state(old.context, new.context, functools.partial(_change_linkers, stage, generator))
+    pairs = list(zip(old_built.filaments, built.filaments))
+    have_come = any(own.takes_part and not other.takes_part for other, own in pairs)
+    if have_come and stage.configuration.relaxes and all(own.growth is None for own in built.filaments):
+        positions = new.context.getState(positions=True).getPositions(asNumpy=True)
+        new.context.setPositions(relaxed_again(stage.configuration, built.filaments, positions))
+
+
+def _change_linkers(stage, generator, columns, force):
+    first = force.getLinkers()
+    rows = {name: columns.get(name) for name in ("numbers", "types", "anchors", "clocks")}
+    rows["chains"], rows["places"] = (columns.get(name).reshape(-1, 2) for name in ("chains", "places"))
+    _let_go(rows, force)
+    keep, added = np.ones(len(rows["numbers"]), bool), []
+    for number, own in enumerate(stage.configuration.linkers):
+        if own.anchors is not None:
+            continue
+        mine = np.flatnonzero(rows["types"] == number)
+        hands = (rows["chains"][mine] >= 0).sum(axis=1)
+        least = 0 if stage.is_piece else KEPT.index(own.keep)
+        # Of a concentration, those that are not bound are nobody's.
+        least = max(least, int(own.concentration is not None))
+        keep[mine[hands < least]] = False
+        mine = mine[hands >= least]
+        if number in stage.counted and own.count is not None:
+            excess = len(mine) - own.count
+            if excess > 0:
+                keep[generator.choice(mine, excess, replace=False)] = False
+            added.append((number, max(0, -excess), own.bound if number in stage.bound else 0))
+    rows = {name: values[keep] for name, values in rows.items()}
+    parts, next_number = [rows], int(columns.get("nextNumber")[0])
+    for number, count, bound in added:
+        parts.append(_new_linkers(number, count, bound, next_number, first))
+        next_number += count
+    for name in rows:
+        columns.put(name, np.concatenate([own[name] for own in parts]))
+    columns.put("nextNumber", [next_number])
+
+
+def _let_go(rows, force):
+    # Hands of which a stage says that they do not bind there.
+    for number in range(force.getNumLinkerTypes()):
+        for side, hand in enumerate(force.getLinkerTypeParameters(number)[:2]):
+            if hand < 0:
+                continue
+            there = (rows["types"] == number) & (rows["chains"][:, side] >= 0)
+            gone = there & ~np.isin(rows["chains"][:, side], np.array(force.getHandChains(hand)))
+            rows["chains"][gone, side] = -1
+            rows["places"][gone, side] = 0.0
+
+
+def _new_linkers(kind, count, bound, next_number, first):
+    # The first ones begin bound where those of the new System do.
+    _, types, _, chains, places = (np.array(column) for column in first[:5])
+    there = np.flatnonzero(types == kind)[:bound]
+    rows = {
+        "numbers": next_number + np.arange(count),
+        "types": np.full(count, kind),
+        "anchors": np.full(count, -1),
+        "clocks": np.zeros(count),
+        "chains": np.full((count, 2), -1),
+        "places": np.zeros((count, 2)),
+    }
+    rows["chains"][: len(there)] = chains.reshape(-1, 2)[there]
+    rows["places"][: len(there)] = places.reshape(-1, 2)[there]
+    return rows
