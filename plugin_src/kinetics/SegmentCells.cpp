@@ -11,6 +11,8 @@ static const double LARGEST_COORDINATE = 1e9;
 static const double GROWTH = 1.02;
 /** Of a segment: hands that reach less far have longer pieces, and more proposals that come to nothing. */
 static const double MOST_PIECES = 1000;
+/** Counts have so many bits less for their marks: these are read at random, and should be near. */
+static const int COUNT_BITS_LESS = 3;
 
 void SegmentCells::setGrid(double size, const double* box) {
     double changed[9] = {};
@@ -173,6 +175,7 @@ void SegmentCells::cut(const Contours& contours, double reach) {
     lastMark = (static_cast<uint32_t>(1)<<min(31, slotBits+5))-1;
     held.resize((lastMark>>6)+2);
     near.resize(held.size());
+    lastCount = lastMark>>COUNT_BITS_LESS;
     gridNumber++;
 }
 
@@ -218,7 +221,7 @@ double SegmentCells::findVectors(const Contours& contours, const double* positio
 }
 
 void SegmentCells::build(const Contours& contours, const double* positions, double reach, const double* box,
-            const double* segmentBox, bool forPoints) {
+            const double* segmentBox, bool forPoints, bool forCounts) {
     if (reach != reachOfPieces)
         cut(contours, reach);
     const int segments = contours.getNumSegments();
@@ -258,6 +261,8 @@ void SegmentCells::build(const Contours& contours, const double* positions, doub
     sortAll();
     if (forPoints)
         markAround();
+    if (forCounts)
+        countAround();
 }
 
 /** Sort pieces into cells, and find what is around each cell. */
@@ -328,20 +333,35 @@ void SegmentCells::lookAhead(int cell) {
     }
 }
 
+/** Call a function with the mark of each cell around one. */
+template <class Function> void SegmentCells::forMarksAround(const Cell& cell, Function function) const {
+    int x[3] = {}, y[3] = {}, z[3] = {};
+    const int numX = findNeighbours(cell.coordinates[0], 0, x), numY = findNeighbours(cell.coordinates[1], 1, y);
+    const int numZ = findNeighbours(cell.coordinates[2], 2, z);
+    for (int k = 0; k < numZ; k++)
+        for (int j = 0; j < numY; j++)
+            for (int i = 0; i < numX; i++) {
+                const int other[3] = {x[i], y[j], z[k]};
+                function(markOf(other));
+            }
+}
+
 /** Mark all cells that have one which holds something around them. */
 void SegmentCells::markAround() {
     fill(near.begin(), near.end(), 0);
-    for (const Cell& cell : cells) {
-        int x[3] = {}, y[3] = {}, z[3] = {};
-        const int numX = findNeighbours(cell.coordinates[0], 0, x), numY = findNeighbours(cell.coordinates[1], 1, y);
-        const int numZ = findNeighbours(cell.coordinates[2], 2, z);
-        for (int k = 0; k < numZ; k++)
-            for (int j = 0; j < numY; j++)
-                for (int i = 0; i < numX; i++) {
-                    const int other[3] = {x[i], y[j], z[k]};
-                    mark(near, markOf(other));
-                }
-    }
+    for (const Cell& cell : cells)
+        forMarksAround(cell, [&] (uint32_t number) {
+            mark(near, number);
+        });
+}
+
+/** Add the number of pieces in each cell to the marks of those around it. */
+void SegmentCells::countAround() {
+    counts.assign(static_cast<size_t>(lastCount)+1, 0);
+    for (const Cell& cell : cells)
+        forMarksAround(cell, [&] (uint32_t number) {
+            counts[number&lastCount] += cell.count;
+        });
 }
 
 const SegmentPiece& SegmentCells::getAround(const Around& found, int number) const {

@@ -37,7 +37,8 @@ static void write(const CylinderChainBindingForce& force, SerializationNode& nod
         types.createChildNode("LinkerType").setIntProperty("hand1", type.hands[0])
                 .setIntProperty("hand2", type.hands[1]).setDoubleProperty("restLength", type.restLength)
                 .setDoubleProperty("stiffness", type.stiffness).setBoolProperty("sameChain", type.sameChain)
-                .setDoubleProperty("volume", type.volume).setDoubleProperty("concentration", type.concentration);
+                .setDoubleProperty("volume", type.volume).setDoubleProperty("concentration", type.concentration)
+                .setDoubleProperty("diffusion", type.diffusion).setBoolProperty("planar", type.planar);
     }
     SerializationNode& anchors = node.createChildNode("Anchors");
     for (int i = 0; i < force.getNumAnchors(); i++) {
@@ -87,6 +88,8 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
                 type.getBoolProperty("sameChain"));
         force->setLinkerTypeReservoir(number, type.getDoubleProperty("volume"),
                 type.getDoubleProperty("concentration"));
+        if (type.hasProperty("diffusion"))
+            force->setLinkerTypeDiffusion(number, type.getDoubleProperty("diffusion"), type.getBoolProperty("planar"));
     }
     for (auto& anchor : node.getChildNode("Anchors").getChildren()) {
         const int particle = anchor.getIntProperty("particle");
@@ -101,9 +104,12 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
         force->addBranchJoint(columns.getOne<int>("nucleator"), columns.get<int>("types"),
                 columns.get<double>("onMother"), columns.get<double>("onBranch"));
     }
-    const LinkerColumns linkers(restoreLinkers(StateColumns::read(node.getChildNode("Linkers"))));
+    const cylchain::LinkerState state = restoreLinkers(StateColumns::read(node.getChildNode("Linkers")));
+    const LinkerColumns linkers(state);
     force->setLinkers(linkers.numbers, linkers.types, linkers.anchors, linkers.chains, linkers.places,
             linkers.nextNumber);
+    const FreeColumns unbound(state);
+    force->setUnboundPositions(unbound.numbers, unbound.places);
     return force;
 }
 

@@ -262,12 +262,16 @@ public:
             bool nearestParticles) = 0;
     /**
      * Take note that chains have grown or shrunk, where this platform has such: see
-     * cylchain::LinkerKinetics::setChains().
+     * cylchain::LinkerKinetics::setChains(). Random numbers are those of execute().
      */
-    virtual bool setChains(const cylchain::ChainList&, const std::vector<cylchain::ChainCut>&,
-            cylchain::LinkerState&) {
+    virtual bool setChains(ContextImpl&, const cylchain::ChainList&, const std::vector<cylchain::ChainCut>&,
+            cylchain::LinkerState&, std::uint32_t, int) {
         return false;
     }
+    /**
+     * Set within which walls linkers are that diffuse.
+     */
+    virtual void setWalls(const std::vector<cylchain::Wall>& walls) = 0;
     /**
      * Take a step of the linkers, in which particles do not move.
      *

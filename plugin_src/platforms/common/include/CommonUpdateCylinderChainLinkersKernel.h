@@ -20,6 +20,9 @@ public:
     long long execute(ContextImpl& context, cylchain::LinkerState& state, double kT, double stepSize,
             std::uint32_t seed, int force, std::vector<cylchain::Link>& links);
     void describe(const cylchain::LinkerState& state, std::vector<cylchain::Link>& links);
+    void setWalls(const std::vector<cylchain::Wall>& walls) {
+        kinetics->setWalls(walls);
+    }
 private:
     void refuseImplicitSteps(ContextImpl& context);
     ComputeContext& cc;
