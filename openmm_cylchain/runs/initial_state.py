@@ -192,6 +192,8 @@ def place_filaments(configuration, engine, seed, kinetics=True):
                 anchors=anchors,
                 bound=0 if later else own.bound,
                 seed=seed,
+                diffusion=own.diffusion,
+                planar=own.planar,
             )
     return filaments
 

@@ -1,5 +1,4 @@
 #include "kinetics/LinkerKinetics.h"
-#include "kinetics/LinkerRegion.h"
 #include "lanes/Noise.h"
 #include <algorithm>
 #include <cmath>

@@ -3,6 +3,7 @@
 
 #include "couplings/Contours.h"
 #include "couplings/Links.h"
+#include "kinetics/LinkerRegion.h"
 #include "kinetics/Linkers.h"
 #include "kinetics/RandomNumbers.h"
 #include "kinetics/SegmentCells.h"
@@ -71,6 +72,10 @@ public:
     /** Set within which walls linkers are that diffuse. */
     void setWalls(const std::vector<Wall>& walls) {
         system.walls = walls;
+    }
+    /** Give positions to linkers that diffuse and have none; false if there is no room within the walls. */
+    bool placeFree(LinkerState& state, const KineticStep& step) const {
+        return placeFreeLinkers(state, system, step.boxes.distances, step.seed, step.force);
     }
     /**
      * Take note that chains have grown, shrunk, or were cut. Hands beyond an end let go, or stay there.

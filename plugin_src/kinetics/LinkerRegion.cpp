@@ -13,10 +13,6 @@ const int MOST_TRIES = 1000000;
 /** The level of noise to which first positions belong: the events of linkers are at level 0. */
 const uint32_t LEVEL_OF_FIRST_POSITIONS = 31;
 
-bool isClosed(const Wall& wall) {
-    return wall.shape == WallShape::Sphere || wall.shape == WallShape::Box || wall.shape == WallShape::Ellipsoid;
-}
-
 /** The corners of a box around a wall that is closed. */
 void findBounds(const Wall& wall, double* lower, double* upper) {
     for (int k = 0; k < 3; k++) {
@@ -36,14 +32,6 @@ bool LinkerRegion::isBeyond(const double* center, double radius) const {
                 return true;
         }
     return false;
-}
-
-bool LinkerRegion::isBounded() const {
-    if (any_of(walls.begin(), walls.end(), isClosed))
-        return true;
-    return box != nullptr && none_of(walls.begin(), walls.end(), [] (const Wall& wall) {
-        return wall.shape == WallShape::Plane;
-    });
 }
 
 bool LinkerRegion::draw(RandomNumbers& random, bool planar, double* position) const {

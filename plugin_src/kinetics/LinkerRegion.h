@@ -30,7 +30,18 @@ public:
      * Whether it has a volume: a wall is closed, or there is a box, and no wall but slabs and cylinders. A half space
      * and a box have none, since walls have no periodic images.
      */
-    bool isBounded() const;
+    bool isBounded() const {
+        bool anyPlane = false;
+        for (const Wall& wall : walls) {
+            if (isClosed(wall))
+                return true;
+            anyPlane = anyPlane || wall.shape == WallShape::Plane;
+        }
+        return box != nullptr && !anyPlane;
+    }
+    static bool isClosed(const Wall& wall) {
+        return wall.shape == WallShape::Sphere || wall.shape == WallShape::Box || wall.shape == WallShape::Ellipsoid;
+    }
     /** Draw a position, each with the same chance; false if none of a million drawn is within all walls. */
     bool draw(RandomNumbers& random, bool planar, double* position) const;
 private:

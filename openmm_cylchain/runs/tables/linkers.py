@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...couplings.shapes import Box, Ellipsoid, Plane, Sphere
 from ...couplings.wall_points import random_points_on
 from ...errors import InputError
 from ...filaments.end_states import ENDS
@@ -160,12 +161,22 @@ LINKERS = TableKind(
             None,
             "Volume in which unbound linkers are; what the wall and the box leave if not given.",
         ),
+        Key(
+            "diffusion",
+            Quantity(units.DIFFUSION, "zero"),
+            None,
+            "Diffusion coefficient of unbound linkers, which have positions then: within walls and the box.",
+        ),
+        Key("planar", Flag(), False, "Whether unbound linkers that diffuse stay in the plane z = 0."),
         Key("anchors", _Anchors(), None, "Points to which they are tied, one each, in place of their first hands."),
         Key("bound", Whole(0, 10**7, "100"), 0, "How many begin with one hand bound, at random or near anchors."),
     ),
     "Crosslinkers or motors that bind to filaments, walk along them and unbind; the page on linkers has their laws.",
     repeated=True,
 )
+
+
+_BEFORE_ANCHORS, _BEHIND_ANCHORS = ("count", "concentration", "volume"), ("bound", "diffusion", "planar")
 
 
 @dataclass(frozen=True)
@@ -178,16 +189,20 @@ class LinkerGroup:
     volume: float | None
     anchors: tuple | None
     bound: int
+    diffusion: float | None
+    planar: bool
 
 
 def read_linkers(entries, groups, box, seed, walls=()):
     """The LinkerGroup of a [[linkers]] table, for FilamentGroups; the seed is that of anchors at random places."""
     anchors = _anchor_points(entries, sum(own.count * own.nodes for own in groups), seed, box, walls)
-    names = ("count", "concentration", "volume")
-    group = LinkerGroup(_kind(entries), *(entries[name] for name in names), anchors, entries["bound"])
+    first, last = (tuple(entries[name] for name in names) for names in (_BEFORE_ANCHORS, _BEHIND_ANCHORS))
+    group = LinkerGroup(_kind(entries), *first, anchors, *last)
     with entries.naming():
-        as_linkers(group.kind, group.count, group.concentration, group.volume, group.anchors, group.bound, 0)
-    if group.count is not None and group.volume is None and (box is None or walls):
+        as_linkers(group.kind, *first, group.anchors, group.bound, 0, group.diffusion, group.planar)
+    if group.diffusion is not None:
+        _check_region(entries, [wall.shape for wall in walls], box)
+    elif group.count is not None and group.volume is None and (box is None or walls):
         group = dataclasses.replace(group, volume=_volume(entries, [wall.shape for wall in walls], box))
     names = sorted({own.type.name for own in groups})
     for hand in group.kind.hands:
@@ -212,6 +227,16 @@ def read_linkers(entries, groups, box, seed, walls=()):
             with entries.naming():
                 hand.filament_end.find_changes(bound)
     return group
+
+
+def _check_region(entries, shapes, box):
+    if not any(isinstance(shape, (Sphere, Ellipsoid, Box)) for shape in shapes) and (
+        box is None or any(isinstance(shape, Plane) for shape in shapes)
+    ):
+        raise entries.error(
+            "linkers that diffuse need a region: add a [[wall]] that is closed (a sphere, an ellipsoid or a box), or a "
+            f"periodic [box] with edges = {EDGES.example}, in which there may be a slab or a cylinder."
+        )
 
 
 def _volume(entries, shapes, box):

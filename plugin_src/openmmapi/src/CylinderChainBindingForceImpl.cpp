@@ -146,23 +146,24 @@ vector<cylchain::Wall> CylinderChainBindingForceImpl::findWalls() const {
     return walls;
 }
 
-void CylinderChainBindingForceImpl::placeUnbound(cylchain::LinkerState& changed) const {
+void CylinderChainBindingForceImpl::placeUnbound(cylchain::LinkerState& changed) {
     if (!system.anyDiffuses()) {
         changed.positions.clear();
         return;
     }
-    cylchain::LinkerSystem placed = system;
-    placed.walls = findWalls();
+    const vector<cylchain::Wall> walls = findWalls();
     Vec3 box[3];
     context->getPeriodicBoxVectors(box[0], box[1], box[2]);
     const double* const periodicBox = owner.usesPeriodicBoundaryConditions() ? &box[0][0] : NULL;
-    const cylchain::LinkerRegion region(placed.walls, periodicBox);
+    const cylchain::LinkerRegion region(walls, periodicBox);
     require(region.isBounded(), "Linkers that diffuse need a region: add a CylinderChainWallForce that is closed (a "
             "sphere, a box or an ellipsoid), or have a periodic box, with nothing but slabs and cylinders in it");
     for (size_t i = 0; 3*i < changed.positions.size(); i++)
         require(!(changed.positions[3*i] == changed.positions[3*i]) || region.encloses(&changed.positions[3*i]),
                 "Linker "+to_string(changed.linkers[i].number)+" is outside of the walls");
-    require(placeFreeLinkers(changed, placed, periodicBox, seed, (uint32_t) number),
+    UpdateCylinderChainLinkersKernel& kernel = linkerKernel.getAs<UpdateCylinderChainLinkersKernel>();
+    kernel.setWalls(walls);
+    require(kernel.placeFree(*context, changed, seed, number),
             "There is no room for linkers that diffuse within all walls");
 }
 

@@ -273,6 +273,12 @@ public:
      */
     virtual void setWalls(const std::vector<cylchain::Wall>& walls) = 0;
     /**
+     * Give positions to linkers that diffuse and have none.
+     *
+     * @return false if there is no room within the walls
+     */
+    virtual bool placeFree(ContextImpl& context, cylchain::LinkerState& state, std::uint32_t seed, int force) = 0;
+    /**
      * Take a step of the linkers, in which particles do not move.
      *
      * @param context     the context in which to execute this kernel

@@ -23,6 +23,7 @@ public:
     void setWalls(const std::vector<cylchain::Wall>& walls) {
         kinetics->setWalls(walls);
     }
+    bool placeFree(ContextImpl& context, cylchain::LinkerState& state, std::uint32_t seed, int force);
 private:
     void refuseImplicitSteps(ContextImpl& context);
     ComputeContext& cc;

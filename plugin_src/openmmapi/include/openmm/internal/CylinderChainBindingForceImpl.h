@@ -81,7 +81,7 @@ private:
     /**
      * Find positions for linkers that diffuse, and check those that they have.
      */
-    void placeUnbound(cylchain::LinkerState& changed) const;
+    void placeUnbound(cylchain::LinkerState& changed);
     void follow() const;
     void accept();
     /**
