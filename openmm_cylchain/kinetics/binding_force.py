@@ -80,6 +80,9 @@ def make_binding_force(
         force.setLinkerTypeReservoir(number, own.volume or 0.0, density)
         if own.diffusion is not None:
             force.setLinkerTypeDiffusion(number, own.diffusion, own.planar)
+        for shape in own.region:
+            name, point, direction, length = shape.region
+            force.addLinkerTypeWall(number, name, openmm.Vec3(*point), openmm.Vec3(*direction), length)
         for anchor in () if own.anchors is None else own.anchors:
             _add_anchor(force, anchor)
     _add_branch_joints(force, filaments, len(linkers))

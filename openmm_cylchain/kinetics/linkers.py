@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import openmm
 
+from ..couplings.shapes import Shape
 from ..couplings.walls import as_filament_wall_force
 from ..errors import InputError, LinkerWarning
 from ..units.quantities import (
@@ -18,6 +19,7 @@ from ..units.quantities import (
     in_units_of,
     non_negative,
     positive,
+    shown,
     thermal_energy,
     true_or_false,
     whole_number,
@@ -59,6 +61,8 @@ class Linkers:
         Of those that are not bound, in nm^2/ps, if they have positions of their own.
     planar : bool
         Whether these stay in the plane z = 0.
+    region : tuple of Shape
+        All of which they are within then; the walls of the System if there are none.
     """
 
     kind: Crosslinker
@@ -70,6 +74,7 @@ class Linkers:
     seed: int
     diffusion: float | None = None
     planar: bool = False
+    region: tuple[Shape, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -107,6 +112,7 @@ def as_linkers(
     seed: int,
     diffusion: Scalar | None = None,
     planar: bool = False,
+    region: Shape | Sequence[Shape] | None = None,
 ) -> Linkers:
     """Linkers from what a user gives; InputError if something is wrong, or missing."""
     if not isinstance(kind, Crosslinker):
@@ -123,6 +129,9 @@ def as_linkers(
         )
     if true_or_false(planar, f"{label} planar") and coefficient is None:
         raise InputError(f"{label} planar says how unbound linkers diffuse: give their diffusion.")
+    shapes = _as_shapes(region, label)
+    if shapes and coefficient is None:
+        raise InputError(f"{label} a region is where unbound linkers diffuse: give their diffusion.")
     room = None if volume is None else positive(volume, VOLUME, f"{label} volume")
     if room is not None and count is None:
         raise InputError(
@@ -142,7 +151,17 @@ def as_linkers(
     number = whole_number(count, 0, f"{label} count")
     if number > MOST_LINKERS:
         raise InputError(f"{label} count must be at most {MOST_LINKERS}, but is {number}.")
-    return Linkers(kind, number, None, room, None, _as_bound(bound, number, label), seed, coefficient, planar)
+    begin = _as_bound(bound, number, label)
+    return Linkers(kind, number, None, room, None, begin, seed, coefficient, planar, shapes)
+
+
+def _as_shapes(region, label):
+    shapes = (region,) if isinstance(region, Shape) else region
+    if shapes is None:
+        return ()
+    if not isinstance(shapes, Sequence) or not shapes or not all(isinstance(own, Shape) for own in shapes):
+        raise InputError(f"{label} region must be a Shape such as Sphere, or several, but is {shown(region)}.")
+    return tuple(shapes)
 
 
 def refuse_linkers_without_volume(linkers: Sequence[Linkers], system: openmm.System) -> None:
@@ -160,15 +179,28 @@ def refuse_linkers_without_volume(linkers: Sequence[Linkers], system: openmm.Sys
 
 
 def _refuse_without_region(linkers, system):
-    walls = [own for own in map(as_filament_wall_force, system.getForces()) if own is not None]
-    shapes = [wall.getRegion()[0] for wall in walls]
-    closed = any(name in _CLOSED for name in shapes)
-    if not closed and (not system.usesPeriodicBoundaryConditions() or "plane" in shapes):
+    walls = [own.region for own in linkers.region]
+    if not walls:
+        forces = [own for own in map(as_filament_wall_force, system.getForces()) if own is not None]
+        walls = [(name, *found) for name, *found in (force.getRegion() for force in forces)]
+    if not is_closed(walls, system.usesPeriodicBoundaryConditions()):
         raise InputError(
-            f"Linkers {linkers.kind.name!r} diffuse, and need a region: add a filament_wall_force of a closed shape (a "
-            "Sphere, Box or Ellipsoid) to the System, or give it box_vectors, in which there may be a Slab or a "
-            "Cylinder."
+            f"Linkers {linkers.kind.name!r} diffuse, and need a region: give add_linkers one (a Sphere, Box or "
+            "Ellipsoid, or a Cylinder with a Slab across it), add a filament_wall_force of such a shape to the System, "
+            "or give that box_vectors, in which there may be a Slab or a Cylinder."
         )
+
+
+def is_closed(walls: Sequence[tuple], periodic: bool) -> bool:
+    """Whether walls, as a CylinderChainWallForce has their regions, and a periodic box leave a volume."""
+    names = [wall[0] for wall in walls]
+    if any(name in _CLOSED for name in names) or (periodic and "plane" not in names):
+        return True
+    axes = [
+        [np.array(wall[2]._value if hasattr(wall[2], "_value") else wall[2]) for wall in walls if wall[0] == name]
+        for name in ("cylinder", "slab")
+    ]
+    return any(abs(first @ second) > 1.0 - 1e-9 for first in axes[0] for second in axes[1])
 
 
 def warn_if_springs_do_not_fit(kind: Crosslinker, temperature: Scalar) -> None:

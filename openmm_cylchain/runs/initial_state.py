@@ -194,6 +194,7 @@ def place_filaments(configuration, engine, seed, kinetics=True):
                 seed=seed,
                 diffusion=own.diffusion,
                 planar=own.planar,
+                region=own.region,
             )
     return filaments
 

@@ -54,9 +54,11 @@ void LinkerKinetics::diffuse(LinkerState& state, const KineticStep& step, int fi
         return;
     const NoiseKey key = {step.seed, LEVEL_OF_DIFFUSION, state.steps};
     drawWords(key, NoiseKind::Linker, 0, forces, numbers, count, words);
-    const LinkerRegion region(system.walls, step.boxes.distances);
     for (int n = 0; n < count; n++) {
-        const Kind& kind = kinds[watches[indices[n]].kind];
+        const int own = watches[indices[n]].kind;
+        const Kind& kind = kinds[own];
+        const vector<Wall>& walls = system.wallsOf(system.types[own/4]);
+        const LinkerRegion region(walls, step.boxes.distances);
         const double size = 2*sqrt(6*kind.diffusion*step.stepSize);
         double* const position = &state.positions[3*indices[n]];
         double moved[3];
@@ -64,7 +66,7 @@ void LinkerKinetics::diffuse(LinkerState& state, const KineticStep& step, int fi
             moved[k] = position[k]+size*((words[4*n+k]+0.5)*WORD-0.5);
         if (kind.isPlanar)
             moved[2] = position[2];
-        if (system.walls.empty() || region.encloses(moved))
+        if (walls.empty() || region.encloses(moved))
             copy(moved, moved+3, position);
         else if (!region.encloses(position)) {
             // Walls have moved.
@@ -104,7 +106,7 @@ bool LinkerKinetics::findRelease(const Linker& linker, int side, const KineticSt
     double center[3];
     locate(placeOf(linker, side), step.positions, step.boxes.segments, center);
     drawAround(random, center, reach, type.planar, position);
-    const LinkerRegion region(system.walls, step.boxes.distances);
+    const LinkerRegion region(system.wallsOf(type), step.boxes.distances);
     if (region.encloses(position))
         return true;
     // A hand that was carried away from all places where it could let go.
@@ -115,7 +117,7 @@ bool LinkerKinetics::findRelease(const Linker& linker, int side, const KineticSt
 void LinkerKinetics::release(LinkerState& state, size_t index, int side, const double* center,
         const KineticStep& step, RandomNumbers& random) const {
     const LinkerType& type = system.types[state.linkers[index].type];
-    const LinkerRegion region(system.walls, step.boxes.distances);
+    const LinkerRegion region(system.wallsOf(type), step.boxes.distances);
     double* const position = &state.positions[3*index];
     for (int i = 0; i < MOST_TRIES; i++) {
         drawAround(random, center, system.hands[type.hands[side]].reach, type.planar, position);

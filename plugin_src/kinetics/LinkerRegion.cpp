@@ -13,15 +13,6 @@ const int MOST_TRIES = 1000000;
 /** The level of noise to which first positions belong: the events of linkers are at level 0. */
 const uint32_t LEVEL_OF_FIRST_POSITIONS = 31;
 
-/** The corners of a box around a wall that is closed. */
-void findBounds(const Wall& wall, double* lower, double* upper) {
-    for (int k = 0; k < 3; k++) {
-        const double half = wall.shape == WallShape::Sphere ? wall.length : wall.vector[k];
-        lower[k] = wall.shape == WallShape::Box ? wall.point[k] : wall.point[k]-half;
-        upper[k] = wall.shape == WallShape::Box ? wall.vector[k] : wall.point[k]+half;
-    }
-}
-
 } // namespace
 
 bool LinkerRegion::isBeyond(const double* center, double radius) const {
@@ -35,23 +26,14 @@ bool LinkerRegion::isBeyond(const double* center, double radius) const {
 }
 
 bool LinkerRegion::draw(RandomNumbers& random, bool planar, double* position) const {
-    // The smallest box around a closed wall, or else a cell of the periodic box around the middle of a wall.
-    double origin[3] = {0, 0, 0}, edges[9] = {};
-    double smallest = numeric_limits<double>::infinity();
-    for (const Wall& wall : walls)
-        if (isClosed(wall)) {
-            double lower[3], upper[3];
-            findBounds(wall, lower, upper);
-            const double volume = (upper[0]-lower[0])*(upper[1]-lower[1])*(upper[2]-lower[2]);
-            if (volume < smallest) {
-                smallest = volume;
-                for (int k = 0; k < 3; k++) {
-                    origin[k] = lower[k];
-                    edges[4*k] = upper[k]-lower[k];
-                }
-            }
+    // The box around a closed wall, or else a cell of the periodic box around the middle of a wall.
+    double origin[3] = {0, 0, 0}, edges[9] = {}, lower[3], upper[3];
+    if (findBounds(lower, upper))
+        for (int k = 0; k < 3; k++) {
+            origin[k] = lower[k];
+            edges[4*k] = upper[k]-lower[k];
         }
-    if (!(smallest < numeric_limits<double>::infinity())) {
+    else {
         if (box == nullptr)
             return false;
         copy(box, box+9, edges);
@@ -95,7 +77,6 @@ bool cylchain::placeFreeLinkers(LinkerState& state, const LinkerSystem& system, 
         state.positions.clear();
         return true;
     }
-    const LinkerRegion region(system.walls, box);
     const NoiseKey key = {seed, LEVEL_OF_FIRST_POSITIONS, state.steps};
     state.positions.resize(3*state.linkers.size(), numeric_limits<double>::quiet_NaN());
     for (size_t i = 0; i < state.linkers.size(); i++) {
@@ -109,7 +90,7 @@ bool cylchain::placeFreeLinkers(LinkerState& state, const LinkerSystem& system, 
         if (!isnan(position[0]))
             continue;
         RandomNumbers random(key, force, linker.number);
-        if (!region.draw(random, type.planar, position))
+        if (!LinkerRegion(system.wallsOf(type), box).draw(random, type.planar, position))
             return false;
     }
     return true;

@@ -89,6 +89,8 @@ struct LinkerType {
      */
     double diffusion = -1;
     bool planar = false;
+    /** What they are within then; those of the System if there are none. */
+    std::vector<Wall> walls = {};
     bool diffuses() const {
         return diffusion >= 0;
     }
@@ -188,8 +190,11 @@ struct LinkerSystem {
     std::vector<LinkerType> types;
     std::vector<Place> anchors;
     double kT = 0;
-    /** Linkers that diffuse are within all of these. */
+    /** Linkers that diffuse are within all of these, or those of their type. */
     std::vector<Wall> walls = {};
+    const std::vector<Wall>& wallsOf(const LinkerType& type) const {
+        return type.walls.empty() ? walls : type.walls;
+    }
     bool anyDiffuses() const {
         for (const LinkerType& type : types)
             if (type.diffuses())

@@ -128,7 +128,6 @@ def test_hands_bind_from_solution_in_the_plane(tmp_path):
 @pytest.mark.parametrize(
     ("couple", "missing"),
     [
-        ("diffusion = 10", "linkers that diffuse by themselves"),
         ("diffusion = fast; specificity = parallel", "rules for pairs of hands"),
         ("diffusion = fast; trans_activated = 1", "rules for pairs of hands"),
         ("diffusion = fast; activity = fork; torque = 1, 1", "links that hold an angle (fork)"),

@@ -5,20 +5,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...couplings.shapes import Box, Ellipsoid, Plane, Sphere
 from ...couplings.wall_points import random_points_on
 from ...errors import InputError
 from ...filaments.end_states import ENDS
 from ...kinetics.crosslinker import Crosslinker
 from ...kinetics.hand import AT_ENDS, Hand
 from ...kinetics.hand_at_end import HandAtEnd
-from ...kinetics.linkers import as_linkers
+from ...kinetics.linkers import as_linkers, is_closed
 from ...kinetics.presets import PRESETS
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Flag, Inline, Key, Listing, Number, Pair, Quantity, Text, Whole, as_written, point
 from ..table import Entries, TableKind
 from .filament_types import PRESETS as FILAMENT_PRESETS
-from .shapes import volume_within
+from .shapes import REGION, REGION_EXAMPLE, Region, volume_within
 from .solvent import EDGES
 
 _QUANTITIES = {
@@ -167,6 +166,12 @@ LINKERS = TableKind(
             None,
             "Diffusion coefficient of unbound linkers, which have positions then: within walls and the box.",
         ),
+        Key(
+            "inside",
+            Inline(REGION, REGION_EXAMPLE),
+            None,
+            "A region in which unbound linkers diffuse; what walls and the box leave if not given.",
+        ),
         Key("planar", Flag(), False, "Whether unbound linkers that diffuse stay in the plane z = 0."),
         Key("anchors", _Anchors(), None, "Points to which they are tied, one each, in place of their first hands."),
         Key("bound", Whole(0, 10**7, "100"), 0, "How many begin with one hand bound, at random or near anchors."),
@@ -191,17 +196,24 @@ class LinkerGroup:
     bound: int
     diffusion: float | None
     planar: bool
+    region: tuple | None
 
 
 def read_linkers(entries, groups, box, seed, walls=()):
     """The LinkerGroup of a [[linkers]] table, for FilamentGroups; the seed is that of anchors at random places."""
     anchors = _anchor_points(entries, sum(own.count * own.nodes for own in groups), seed, box, walls)
     first, last = (tuple(entries[name] for name in names) for names in (_BEFORE_ANCHORS, _BEHIND_ANCHORS))
-    group = LinkerGroup(_kind(entries), *first, anchors, *last)
+    region = None if entries["inside"] is None else Region(entries["inside"]).walls
+    group = LinkerGroup(_kind(entries), *first, anchors, *last, region)
     with entries.naming():
-        as_linkers(group.kind, *first, group.anchors, group.bound, 0, group.diffusion, group.planar)
+        as_linkers(group.kind, *first, group.anchors, group.bound, 0, group.diffusion, group.planar, region)
     if group.diffusion is not None:
-        _check_region(entries, [wall.shape for wall in walls], box)
+        if region is None and not is_closed([wall.shape.region for wall in walls], box is not None):
+            raise entries.error(
+                f"linkers that diffuse need a region: inside = {REGION_EXAMPLE}, a [[wall]] that is closed (a sphere, "
+                f"an ellipsoid or a box), or a periodic [box] with edges = {EDGES.example}, in which there may be a "
+                "slit or a cylinder."
+            )
     elif group.count is not None and group.volume is None and (box is None or walls):
         group = dataclasses.replace(group, volume=_volume(entries, [wall.shape for wall in walls], box))
     names = sorted({own.type.name for own in groups})
@@ -227,16 +239,6 @@ def read_linkers(entries, groups, box, seed, walls=()):
             with entries.naming():
                 hand.filament_end.find_changes(bound)
     return group
-
-
-def _check_region(entries, shapes, box):
-    if not any(isinstance(shape, (Sphere, Ellipsoid, Box)) for shape in shapes) and (
-        box is None or any(isinstance(shape, Plane) for shape in shapes)
-    ):
-        raise entries.error(
-            "linkers that diffuse need a region: add a [[wall]] that is closed (a sphere, an ellipsoid or a box), or a "
-            f"periodic [box] with edges = {EDGES.example}, in which there may be a slab or a cylinder."
-        )
 
 
 def _volume(entries, shapes, box):

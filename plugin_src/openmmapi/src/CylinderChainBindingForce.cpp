@@ -1,4 +1,5 @@
 #include "openmm/CylinderChainBindingForce.h"
+#include "openmm/CylinderChainWallForce.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/internal/AssertionUtilities.h"
 #include "openmm/internal/CylinderChainBindingForceImpl.h"
@@ -184,6 +185,23 @@ void CylinderChainBindingForce::setLinkerTypeDiffusion(int type, double diffusio
     requireOfBinding(diffusion == -1 || types[type].hands[0] >= 0, "Anchored linkers do not diffuse");
     types[type].diffusion = diffusion;
     types[type].planar = planar;
+}
+
+void CylinderChainBindingForce::addLinkerTypeWall(int type, const string& shape, const Vec3& point, const Vec3& vector,
+        double length) {
+    ASSERT_VALID_INDEX(type, types);
+    types[type].walls.push_back(CylinderChainWallForce(shape, point, vector, length, 0).getWalls().wall);
+}
+
+string CylinderChainBindingForce::getLinkerTypeWall(int type, int wall, Vec3& point, Vec3& vector,
+        double& length) const {
+    const std::vector<Wall>& walls = getLinkerType(type).walls;
+    ASSERT_VALID_INDEX(wall, walls);
+    const Wall& own = walls[wall];
+    point = Vec3(own.point[0], own.point[1], own.point[2]);
+    vector = Vec3(own.vector[0], own.vector[1], own.vector[2]);
+    length = own.length;
+    return Names<WallShape>::ALL[static_cast<int>(own.shape)];
 }
 
 int CylinderChainBindingForce::addParticleAnchor(int particle) {

@@ -155,12 +155,18 @@ void CylinderChainBindingForceImpl::placeUnbound(cylchain::LinkerState& changed)
     Vec3 box[3];
     context->getPeriodicBoxVectors(box[0], box[1], box[2]);
     const double* const periodicBox = owner.usesPeriodicBoundaryConditions() ? &box[0][0] : NULL;
-    const cylchain::LinkerRegion region(walls, periodicBox);
-    require(region.isBounded(), "Linkers that diffuse need a region: add a CylinderChainWallForce that is closed (a "
-            "sphere, a box or an ellipsoid), or have a periodic box, with nothing but slabs and cylinders in it");
-    for (size_t i = 0; 3*i < changed.positions.size(); i++)
-        require(!(changed.positions[3*i] == changed.positions[3*i]) || region.encloses(&changed.positions[3*i]),
-                "Linker "+to_string(changed.linkers[i].number)+" is outside of the walls");
+    for (const cylchain::LinkerType& type : system.types)
+        require(!type.diffuses() || cylchain::LinkerRegion(type.walls.empty() ? walls : type.walls,
+                periodicBox).isBounded(), "Linkers that diffuse need a region: add a CylinderChainWallForce that is "
+                "closed (a sphere, a box or an ellipsoid), or have a periodic box, with nothing but slabs and cylinders "
+                "in it");
+    for (size_t i = 0; 3*i < changed.positions.size(); i++) {
+        const cylchain::LinkerType& type = system.types[changed.linkers[i].type];
+        const double* position = &changed.positions[3*i];
+        require(std::isnan(position[0]) || cylchain::LinkerRegion(type.walls.empty() ? walls : type.walls,
+                periodicBox).encloses(position), "Linker "+to_string(changed.linkers[i].number)+
+                " is outside of the walls");
+    }
     UpdateCylinderChainLinkersKernel& kernel = linkerKernel.getAs<UpdateCylinderChainLinkersKernel>();
     kernel.setWalls(walls);
     require(kernel.placeFree(*context, changed, seed, number),

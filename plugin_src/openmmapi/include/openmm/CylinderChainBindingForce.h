@@ -5,6 +5,7 @@
 #include "openmm/Context.h"
 #include "openmm/CylinderChainCoupling.h"
 #include "openmm/Vec3.h"
+#include <string>
 #include <vector>
 
 namespace OpenMM {
@@ -242,6 +243,34 @@ public:
      * @param planar     whether they stay in the plane z = 0; the rate of binding has the factor R'/R then
      */
     void setLinkerTypeDiffusion(int type, double diffusion, bool planar);
+    /**
+     * Get the number of walls that linkers of a type are within which diffuse, see addLinkerTypeWall().
+     */
+    int getNumLinkerTypeWalls(int type) const {
+        return getLinkerType(type).walls.size();
+    }
+    /**
+     * Let linkers of a type that diffuse be within a region of their own, in place of the walls of the System; if there
+     * are several, within all of them.
+     *
+     * @param type    the number of the type
+     * @param shape   the name of the shape, see CylinderChainWallForce
+     * @param point   see CylinderChainWallForce, measured in nm
+     * @param vector  see CylinderChainWallForce
+     * @param length  see CylinderChainWallForce, measured in nm
+     */
+    void addLinkerTypeWall(int type, const std::string& shape, const Vec3& point, const Vec3& vector, double length);
+    /**
+     * Get a wall of a type of linkers.
+     *
+     * @param type         the number of the type
+     * @param wall         the number of the wall
+     * @param[out] point   see CylinderChainWallForce, measured in nm
+     * @param[out] vector  see CylinderChainWallForce
+     * @param[out] length  see CylinderChainWallForce, measured in nm
+     * @return the name of the shape
+     */
+    std::string getLinkerTypeWall(int type, int wall, Vec3& point, Vec3& vector, double& length) const;
     /**
      * Get the number of anchors.
      */
