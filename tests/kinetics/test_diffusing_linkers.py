@@ -15,6 +15,7 @@ from openmm_cylchain import (
     InputError,
     LinkerTable,
     Plane,
+    Slab,
     Sphere,
     filament_wall_force,
 )
@@ -64,7 +65,7 @@ def mean_and_error(values, blocks=10):
     return own.mean(axis=0), own.std(axis=0, ddof=1) / np.sqrt(blocks)
 
 
-@pytest.mark.parametrize("step", [1e4, 1e6])
+@pytest.mark.parametrize("step", [1e4, pytest.param(1e6, marks=pytest.mark.slow)])
 def test_as_many_are_bound_as_of_a_reservoir(step):
     """In a sphere: 2 L (c/k) v/V for each that is not, with two hands that bind."""
     filaments = rods()
@@ -136,6 +137,27 @@ def test_they_are_everywhere_in_a_box_of_walls():
     assert np.all(np.abs(mean - expected) < 4.0 * error)
 
 
+def test_a_region_of_their_own():
+    """A cylinder with a slab across it, in which others are within the walls of the System."""
+    filaments = rods()
+    axis = np.array([1.0, 2.0, 2.0]) / 3.0
+    region = [Cylinder([10, 0, 0], axis, 60.0), Slab([20, 20, 20], axis, 90.0)]
+    filaments.add_linkers(spring(0.0), 4000, diffusion=DIFFUSION, region=region)
+    filaments.add_linkers(spring(0.0), 4000, diffusion=DIFFUSION)
+    context = made(filaments, 1e5, Sphere([0, 0, 0], RADIUS))
+    context.getIntegrator().step(100)
+    positions = filaments.in_context(context).linkers().positions
+    own = positions[:4000] - [10, 0, 0]
+    along = own @ axis
+    squares = np.sum(own**2, axis=1) - along**2
+    middle = np.array([10, 20, 20]) @ axis
+    assert np.all(np.abs(along - middle) <= 45.0) and squares.max() <= 3600.0
+    # As many in each half of the area and of the length.
+    assert abs(np.mean(squares < 1800.0) - 0.5) < 4.0 * 0.5 / 4000**0.5
+    assert abs(np.mean(along < middle) - 0.5) < 4.0 * 0.5 / 4000**0.5
+    assert np.linalg.norm(positions[4000:], axis=1).max() > 0.98 * RADIUS
+
+
 @pytest.mark.parametrize("walls", [True, False])
 def test_restarts_are_to_the_bit(walls):
     """Of motors that walk off the ends of filaments that move, in a sphere or a periodic box."""
@@ -201,6 +223,9 @@ def test_positions_are_set_with_the_table():
         ({"anchors": [[0.0, 0.0, 0.0]], "diffusion": 1.0}, "those that diffuse have a count"),
         ({"count": 10, "planar": True, "volume": 1e6}, "give their diffusion"),
         ({"count": 10, "planar": 1, "diffusion": 1.0}, "planar"),
+        ({"count": 10, "region": Sphere([0, 0, 0], 9.0), "volume": 1e6}, "give their diffusion"),
+        ({"count": 10, "region": [], "diffusion": 1.0}, "region must be a Shape"),
+        ({"count": 10, "region": "box", "diffusion": 1.0}, "region must be a Shape"),
     ],
 )
 def test_wrong_arguments_are_refused(arguments, message):
