@@ -82,7 +82,7 @@ bool LinkerKinetics::proposeToFree(const Linker& linker, const double* position,
     const int number = system.types[linker.type].hands[side];
     const double which = random.uniform(), where = random.uniform();
     const SegmentCells::Around around = cells.lookAround(position);
-    const int chosen = static_cast<int>(which*cells.getMostAround(position));
+    const int chosen = static_cast<int>(which*countAroundFree(linker.type, position));
     if (chosen >= around.numPieces || !toProposed(number, cells.getAround(around, chosen), where, sites, found))
         return false;
     double vector[3];

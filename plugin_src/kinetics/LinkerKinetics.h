@@ -125,6 +125,8 @@ private:
         double velocity = 0;
         /** Of linkers that are not bound and have positions. */
         double diffusion = 0;
+        /** If not zero, they are taken to have so many pieces around them, wherever they are. */
+        unsigned most = 0;
         bool isFree = false, isPlanar = false;
         bool atAnchor = false, sameChain = false, walks = false, needsSites = false, pulls = false;
         /** Whether a step has nothing to do for it as long as its clock does not run out. */
@@ -161,6 +163,10 @@ private:
     int pieceOf(const Watch& watch) const;
     bool looksAtPiece(const Watch& watch) const;
     double freeRate(const LinkerType& type, int side) const;
+    unsigned countAroundFree(int type, const double* position) const {
+        const unsigned most = kinds[4*type].most;
+        return most > 0 ? most : cells.getMostAround(position);
+    }
     bool isFree(const Linker& linker) const;
     void diffuse(LinkerState& state, const KineticStep& step, int first, int last) const;
     bool proposeToFree(const Linker& linker, const double* position, int side, const KineticStep& step,

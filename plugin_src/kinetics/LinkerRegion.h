@@ -43,7 +43,7 @@ public:
     /** Draw a position, each with the same chance; false if none of a million drawn is within all walls. */
     bool draw(RandomNumbers& random, bool planar, double* position) const;
 private:
-    /** The corners of a box around a wall that is closed, or a cylinder and a slab across it; false if there is none. */
+    /** The corners of a box around a closed wall, or a cylinder and a slab across it; false if there is none. */
     bool findBounds(double* lower, double* upper) const {
         for (const Wall& wall : walls)
             if (wall.shape == WallShape::Sphere || wall.shape == WallShape::Box || wall.shape == WallShape::Ellipsoid) {

@@ -1,6 +1,7 @@
 #include "kinetics/SegmentCells.h"
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 using namespace cylchain;
 using namespace std;
@@ -13,6 +14,14 @@ static const double GROWTH = 1.02;
 static const double MOST_PIECES = 1000;
 /** Counts have so many bits less for their marks: these are read at random, and should be near. */
 static const int COUNT_BITS_LESS = 3;
+
+/** floor(), which the oldest processors do not have as an instruction. */
+static inline double roundDown(double x) {
+    if (!(fabs(x) < 1e15))
+        return floor(x);
+    const double whole = static_cast<double>(static_cast<int64_t>(x));
+    return whole > x ? whole-1 : whole;
+}
 
 void SegmentCells::setGrid(double size, const double* box) {
     double changed[9] = {};
@@ -43,7 +52,7 @@ void SegmentCells::findCoordinates(const double* point, int* coordinates) const 
     if (numCells[0] == 0) {
         for (int k = 0; k < 3; k++)
             coordinates[k] = static_cast<int>(min(LARGEST_COORDINATE, max(-LARGEST_COORDINATE,
-                    floor(toCells[4*k]*point[k]))));
+                    roundDown(toCells[4*k]*point[k]))));
         return;
     }
     for (int k = 0; k < 3; k++) {
@@ -52,7 +61,7 @@ void SegmentCells::findCoordinates(const double* point, int* coordinates) const 
         for (int j = k; j < 3; j++)
             coordinate += toCells[3*k+j]*point[j];
         const int n = numCells[k];
-        coordinate = floor(coordinate-n*floor(coordinate/n));
+        coordinate = roundDown(coordinate-n*roundDown(coordinate/n));
         coordinates[k] = static_cast<int>(min(n-1.0, max(0.0, coordinate)));
     }
 }
@@ -358,9 +367,12 @@ void SegmentCells::markAround() {
 /** Add the number of pieces in each cell to the marks of those around it. */
 void SegmentCells::countAround() {
     counts.assign(static_cast<size_t>(lastCount)+1, 0);
+    mostOfAll = 0;
     for (const Cell& cell : cells)
         forMarksAround(cell, [&] (uint32_t number) {
-            counts[number&lastCount] += cell.count;
+            unsigned& own = counts[number&lastCount];
+            own += cell.count;
+            mostOfAll = max(mostOfAll, own);
         });
 }
 

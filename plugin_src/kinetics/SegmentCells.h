@@ -88,6 +88,10 @@ public:
         findCoordinates(point, coordinates);
         return counts[markOf(coordinates)&lastCount];
     }
+    /** The largest number of getMostAround(). */
+    unsigned getMostOfAll() const {
+        return mostOfAll;
+    }
     std::uint64_t getGridNumber() const {
         return gridNumber;
     }
@@ -144,6 +148,7 @@ private:
     std::vector<std::uint64_t> held, near;
     /** How many pieces are around cells, by their marks. */
     std::vector<unsigned> counts = std::vector<unsigned>(1, 0);
+    unsigned mostOfAll = 0;
     std::uint32_t lastMark = 0, lastCount = 0;
     int slotShift = 0;
 };

@@ -158,8 +158,8 @@ void CylinderChainBindingForceImpl::placeUnbound(cylchain::LinkerState& changed)
     for (const cylchain::LinkerType& type : system.types)
         require(!type.diffuses() || cylchain::LinkerRegion(type.walls.empty() ? walls : type.walls,
                 periodicBox).isBounded(), "Linkers that diffuse need a region: add a CylinderChainWallForce that is "
-                "closed (a sphere, a box or an ellipsoid), or have a periodic box, with nothing but slabs and cylinders "
-                "in it");
+                "closed (a sphere, a box or an ellipsoid), or have a periodic box, with nothing but slabs and "
+                "cylinders in it");
     for (size_t i = 0; 3*i < changed.positions.size(); i++) {
         const cylchain::LinkerType& type = system.types[changed.linkers[i].type];
         const double* position = &changed.positions[3*i];

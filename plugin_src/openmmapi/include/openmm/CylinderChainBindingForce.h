@@ -27,9 +27,9 @@ namespace OpenMM {
  *                                    pathway adds kc exp(-|F|/Fc).
  *
  * Linkers of a type that diffuses have positions while they are not bound: within the walls of each
- * CylinderChainWallForce of the System, and in the periodic box.  They bind a hand with the rate c (R'/R)^(3/2) for each
- * length of filament within its reach R, R' being that of the other hand, and unbind to anywhere in a sphere with the
- * radius R: as often, in equilibrium, as those without positions.
+ * CylinderChainWallForce of the System, or those of the type, and in the periodic box.  They bind a hand with the rate
+ * c (R'/R)^(3/2) for each length of filament within its reach R, R' being that of the other hand, and unbind to
+ * anywhere in a sphere with the radius R: as often, in equilibrium, as those without positions.
  *
  * With the first law of unbinding and without speed, equilibrium is that of the energies, whatever the step is.
  * Lengths along a filament are those of its segments at rest, from its first node, the minus end, to its last, the plus

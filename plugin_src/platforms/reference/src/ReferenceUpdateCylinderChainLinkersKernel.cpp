@@ -31,7 +31,8 @@ KineticStep ReferenceUpdateCylinderChainLinkersKernel::describeStep(ContextImpl&
 long long ReferenceUpdateCylinderChainLinkersKernel::execute(ContextImpl& context, LinkerState& state,
         double kT, double stepSize, uint32_t seed, int force, vector<Link>& links) {
     kinetics->setTemperature(kT);
-    return kinetics->advance(state, describeStep(context, stepSize, seed, force), [&] (int count, const function<void(int)>& iteration) {
+    const KineticStep step = describeStep(context, stepSize, seed, force);
+    return kinetics->advance(state, step, [&] (int count, const function<void(int)>& iteration) {
         loop.run(count, iteration);
     }, &links);
 }
