@@ -4,6 +4,7 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import openmm
@@ -191,7 +192,7 @@ def _refuse_without_region(linkers, system):
         )
 
 
-def is_closed(walls: Sequence[tuple], periodic: bool) -> bool:
+def is_closed(walls: Sequence[tuple[Any, ...]], periodic: bool) -> bool:
     """Whether walls, as a CylinderChainWallForce has their regions, and a periodic box leave a volume."""
     names = [wall[0] for wall in walls]
     if any(name in _CLOSED for name in names) or (periodic and "plane" not in names):

@@ -6,11 +6,13 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import (
+    ACTIN_ATP,
     F_ACTIN,
     Box,
     Crosslinker,
     Cylinder,
     Filaments,
+    Growth,
     Hand,
     InputError,
     LinkerTable,
@@ -177,6 +179,27 @@ def test_restarts_are_to_the_bit(walls):
     free = ~np.isnan(linkers.positions[:, 0])
     assert np.array_equal(free, (linkers.held == 0) & (linkers.types < 2))
     assert 50 < free.sum() < 450
+
+
+def test_those_that_lose_their_filament_are_near_to_where_it_was():
+    """A filament that shrinks under hands that never unbind: one that lets go is within reach of the end."""
+    filaments = Filaments(viscosity=1e-3 * unit.pascal * unit.second, temperature=300.0)
+    growth = Growth(monomers=ACTIN_ATP, pool=0.0, longest=500.0, deterministic=True)
+    filaments.add_straight(F_ACTIN.with_segment_length(54.0), 8, [-216.0, 0, 0], [1, 0, 0], growth=growth)
+    hand = Hand(binding_rate=0.0, reach=REACH, unbinding_rate=0.0)
+    filaments.add_linkers(Crosslinker(hands=hand, stiffness=0.02), 400, bound=400, diffusion=0.0)
+    context = made(filaments, 1e9, Sphere([0, 0, 0], 400.0))
+    here = filaments.in_context(context)
+    for _ in range(20):
+        before = here.linkers()
+        context.getIntegrator().step(1000)
+        table = here.linkers()
+        let_go = (before.held == 1) & (table.held == 0)
+        assert np.array_equal(np.isfinite(table.positions).all(axis=1), table.held == 0)
+        # Along the filament, which turns: how far from its middle.
+        distance = np.linalg.norm(table.positions[let_go], axis=1)
+        assert np.all(distance < 240.0 + REACH)
+    assert 20 < np.sum(table.held == 0) < 400
 
 
 def test_systems_as_xml_have_them():
