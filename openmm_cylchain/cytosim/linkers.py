@@ -12,8 +12,9 @@ from .places import draw_inside, unknown_position
 from .script import count_of
 from .settings import OFF
 
-_DIFFUSION, _PAIRS = "linkers that diffuse by themselves", "rules for pairs of hands"
+_PAIRS = "rules for pairs of hands"
 _MOST_ANCHORS = 50_000
+_HALF_OF_NO_SPACE = 5.0
 _RANGE_AND_LAW = (
     "k_on/(2 reach) exp(-U/kT) for each length within reach of a hand that is tied, which has an equilibrium; in "
     "Cytosim it is k_on wherever a fiber is within reach, however strained"
@@ -281,15 +282,14 @@ def _add_count(translation, table, own, linked, hand):
     settings = own.settings
     table.add("count", linked.count, Note(EXACT, ""))
     fast = settings.text("diffusion") == "fast" or settings.flag("fast_diffusion")
-    if not fast:
-        rate = settings.number("diffusion", default=0.0)
-        text = f"diffusion = {rate:g} um^2/s: those that are not bound are anywhere here"
-        table.comment(Note(LEFT_OUT, text, settings.line_of("diffusion"), _DIFFUSION))
     if settings.text("confine") in ("on", "surface"):
         table.comment(Note(LEFT_OUT, "confine = on", settings.line_of("confine"), "surfaces: linkers on one"))
     if settings.number(("fast_diffusion", 1), default=0.0) > 0.0:
         table.comment(Note(LEFT_OUT, "a reservoir of a fixed number", settings.line, "linkers: reservoirs"))
     space = translation.space(settings.confining_space())
+    if not fast:
+        _add_diffusion(translation, table, own, space)
+        return
     if space is None or space.volume is None:
         if translation.document.tables_called("[box]"):
             return
@@ -302,3 +302,21 @@ def _add_count(translation, table, own, linked, hand):
         volume, why = 2.0 / 3.0 * space.volume, "2/3 of it"
     note = Note(EXACT, f"{why}, by which hands bind from solution as often as in Cytosim")
     table.add("volume", quantity(volume, "um^3"), note)
+
+
+def _add_diffusion(translation, table, own, space):
+    settings = own.settings
+    rate = settings.number("diffusion", default=0.0)
+    text = "a hand binds to each length within reach, and unbinds to anywhere in reach; Cytosim's to where it is"
+    table.add("diffusion", quantity(rate, "um^2/s"), Note(NEAREST, text, settings.line_of("diffusion")))
+    if translation.dimensions == 2:
+        table.add("planar", True, Note(EXACT, "two dimensions: in the plane z = 0"))
+    if space is not None and space.region is not None and not space.edges:
+        table.add("inside", space.region, Note(EXACT, "its space"))
+    elif not translation.document.tables_called("[box]"):
+        text, needs, middle, half = "no space that is known", "spaces: volume", np.zeros(3), [_HALF_OF_NO_SPACE] * 3
+        if space is not None:
+            text, needs, middle = "a box around the space", f"walls: {space.shape}", space.middle
+            half = [own or _HALF_OF_NO_SPACE for own in space.half]
+        region = {"shape": "box", "lower": point(middle - half), "upper": point(middle + half)}
+        table.add("inside", region, Note(LEFT_OUT, text, settings.line_of("diffusion"), needs))

@@ -78,6 +78,11 @@ def make_binding_force(
         )
         density = -1.0 if own.concentration is None else own.concentration
         force.setLinkerTypeReservoir(number, own.volume or 0.0, density)
+        if own.diffusion is not None:
+            force.setLinkerTypeDiffusion(number, own.diffusion, own.planar)
+        for shape in own.region:
+            name, point, direction, length = shape.region
+            force.addLinkerTypeWall(number, name, openmm.Vec3(*point), openmm.Vec3(*direction), length)
         for anchor in () if own.anchors is None else own.anchors:
             _add_anchor(force, anchor)
     _add_branch_joints(force, filaments, len(linkers))
@@ -204,7 +209,10 @@ def table_of(force: Any, context: openmm.Context) -> LinkerTable:
     """The linkers of a Context; InputError if it is not known where they are."""
     with naming_unknown_linkers():
         columns = force.getLinkersInContext(context)
+        unbound, coordinates = force.getUnboundPositionsInContext(context)
     numbers, types, anchors, chains, places = (np.array(column) for column in columns[:5])
+    positions = np.full((len(numbers), 3), np.nan)
+    positions[np.searchsorted(numbers, unbound)] = np.reshape(coordinates, (-1, 3))
     return LinkerTable(
         numbers.astype(int),
         types.astype(int),
@@ -212,6 +220,7 @@ def table_of(force: Any, context: openmm.Context) -> LinkerTable:
         chains.astype(int).reshape(-1, 2),
         places.astype(float).reshape(-1, 2),
         columns[5],
+        positions,
     )
 
 
@@ -221,8 +230,12 @@ def set_table(force: Any, context: openmm.Context, table: LinkerTable) -> None:
     columns = [np.asarray(column).ravel().tolist() for column in (
         table.numbers, table.types, table.anchors, table.filaments, table.arc_lengths
     )]  # fmt: skip
+    known = ~np.isnan(table.positions).all(axis=1)
     try:
         force.setLinkersInContext(context, *columns, int(table.next_number))
+        if np.any(known):
+            positions = table.positions[known].ravel().tolist()
+            force.setUnboundPositionsInContext(context, table.numbers[known].tolist(), positions)
     except openmm.OpenMMException as error:
         raise InputError(str(error)) from None
 

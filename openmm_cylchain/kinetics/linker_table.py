@@ -33,6 +33,9 @@ class LinkerTable:
         were at the start if filaments grow: negative where monomers have come at a minus end.
     next_number : int
         The number of the next linker.
+    positions : (n, 3) float array
+        Where those are that diffuse and are not bound, in nm, not taken back into a periodic box; NaN of others. If not
+        given to ``set_linkers``, they are anywhere.
     """
 
     numbers: IntArray
@@ -41,6 +44,7 @@ class LinkerTable:
     filaments: IntArray
     arc_lengths: FloatArray
     next_number: int
+    positions: FloatArray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         for name in ("numbers", "types", "anchors", "filaments", "arc_lengths"):
@@ -55,12 +59,17 @@ class LinkerTable:
             raise InputError(f"LinkerTable: next_number must be at most {_LARGEST_NUMBER}, but is {next_number}.")
         object.__setattr__(self, "next_number", next_number)
         count = self.numbers.size
+        positions = np.full((count, 3), np.nan)
+        if self.positions is not None:
+            positions = np.asarray(getattr(self.positions, "_value", self.positions), dtype=float)
+        object.__setattr__(self, "positions", positions)
         shapes = {
             "numbers": (count,),
             "types": (count,),
             "anchors": (count,),
             "filaments": (count, 2),
             "arc_lengths": (count, 2),
+            "positions": (count, 3),
         }
         for name, shape in shapes.items():
             if np.shape(getattr(self, name)) != shape:

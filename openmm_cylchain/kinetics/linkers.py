@@ -4,18 +4,25 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import openmm
 
+from ..couplings.shapes import Shape
+from ..couplings.walls import as_filament_wall_force
 from ..errors import InputError, LinkerWarning
 from ..units.quantities import (
+    DIFFUSION,
     LENGTH,
     VOLUME,
     as_number_density,
     in_units_of,
+    non_negative,
     positive,
+    shown,
     thermal_energy,
+    true_or_false,
     whole_number,
 )
 from ..units.types import FloatArray, Scalar
@@ -29,6 +36,9 @@ LARGEST_REACH_OF_WIDTH = 10.0
 
 LARGEST_EXPONENT_AT_REACH = 3.0
 """By which exponent binding may be slower everywhere within reach of a spring of rest length before it is warned of."""
+
+_CLOSED = ("sphere", "box", "ellipsoid")
+"""Regions of walls that have a volume."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +58,12 @@ class Linkers:
         How many begin with their first hand bound at random places, or their only one within reach of its anchor.
     seed : int
         Of these places.
+    diffusion : float or None
+        Of those that are not bound, in nm^2/ps, if they have positions of their own.
+    planar : bool
+        Whether these stay in the plane z = 0.
+    region : tuple of Shape
+        All of which they are within then; the walls of the System if there are none.
     """
 
     kind: Crosslinker
@@ -57,6 +73,9 @@ class Linkers:
     anchors: np.ndarray | None
     bound: int
     seed: int
+    diffusion: float | None = None
+    planar: bool = False
+    region: tuple[Shape, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -92,6 +111,9 @@ def as_linkers(
     anchors: object,
     bound: int,
     seed: int,
+    diffusion: Scalar | None = None,
+    planar: bool = False,
+    region: Shape | Sequence[Shape] | None = None,
 ) -> Linkers:
     """Linkers from what a user gives; InputError if something is wrong, or missing."""
     if not isinstance(kind, Crosslinker):
@@ -100,6 +122,17 @@ def as_linkers(
     seed = whole_number(seed, 0, f"{label} seed")
     if (count is not None) + (concentration is not None) + (anchors is not None) != 1:
         raise InputError(f"{label} give one of count, concentration and anchors.")
+    coefficient = None if diffusion is None else non_negative(diffusion, DIFFUSION, f"{label} diffusion")
+    if coefficient is not None and (count is None or volume is not None):
+        raise InputError(
+            f"{label} those that diffuse have a count, and neither a volume, which is that of the walls or the "
+            "periodic box, nor a concentration or anchors."
+        )
+    if true_or_false(planar, f"{label} planar") and coefficient is None:
+        raise InputError(f"{label} planar says how unbound linkers diffuse: give their diffusion.")
+    shapes = _as_shapes(region, label)
+    if shapes and coefficient is None:
+        raise InputError(f"{label} a region is where unbound linkers diffuse: give their diffusion.")
     room = None if volume is None else positive(volume, VOLUME, f"{label} volume")
     if room is not None and count is None:
         raise InputError(
@@ -119,18 +152,56 @@ def as_linkers(
     number = whole_number(count, 0, f"{label} count")
     if number > MOST_LINKERS:
         raise InputError(f"{label} count must be at most {MOST_LINKERS}, but is {number}.")
-    return Linkers(kind, number, None, room, None, _as_bound(bound, number, label), seed)
+    begin = _as_bound(bound, number, label)
+    return Linkers(kind, number, None, room, None, begin, seed, coefficient, planar, shapes)
+
+
+def _as_shapes(region, label):
+    shapes = (region,) if isinstance(region, Shape) else region
+    if shapes is None:
+        return ()
+    if not isinstance(shapes, Sequence) or not shapes or not all(isinstance(own, Shape) for own in shapes):
+        raise InputError(f"{label} region must be a Shape such as Sphere, or several, but is {shown(region)}.")
+    return tuple(shapes)
 
 
 def refuse_linkers_without_volume(linkers: Sequence[Linkers], system: openmm.System) -> None:
     """Raise InputError for linkers that move freely in a System without a periodic box, in no volume."""
     for own in linkers:
+        if own.diffusion is not None:
+            _refuse_without_region(own, system)
+            continue
         free = own.anchors is None and own.concentration is None and own.volume is None
         if free and not system.usesPeriodicBoundaryConditions():
             raise InputError(
                 f"Linkers {own.kind.name!r} need a volume or a concentration, since there is no periodic box: give "
                 "add_linkers one of them, or box_vectors to the System."
             )
+
+
+def _refuse_without_region(linkers, system):
+    walls = [own.region for own in linkers.region]
+    if not walls:
+        forces = [own for own in map(as_filament_wall_force, system.getForces()) if own is not None]
+        walls = [(name, *found) for name, *found in (force.getRegion() for force in forces)]
+    if not is_closed(walls, system.usesPeriodicBoundaryConditions()):
+        raise InputError(
+            f"Linkers {linkers.kind.name!r} diffuse, and need a region: give add_linkers one (a Sphere, Box or "
+            "Ellipsoid, or a Cylinder with a Slab across it), add a filament_wall_force of such a shape to the System, "
+            "or give that box_vectors, in which there may be a Slab or a Cylinder."
+        )
+
+
+def is_closed(walls: Sequence[tuple[Any, ...]], periodic: bool) -> bool:
+    """Whether walls, as a CylinderChainWallForce has their regions, and a periodic box leave a volume."""
+    names = [wall[0] for wall in walls]
+    if any(name in _CLOSED for name in names) or (periodic and "plane" not in names):
+        return True
+    axes = [
+        [np.array(wall[2]._value if hasattr(wall[2], "_value") else wall[2]) for wall in walls if wall[0] == name]
+        for name in ("cylinder", "slab")
+    ]
+    return any(abs(first @ second) > 1.0 - 1e-9 for first in axes[0] for second in axes[1])
 
 
 def warn_if_springs_do_not_fit(kind: Crosslinker, temperature: Scalar) -> None:

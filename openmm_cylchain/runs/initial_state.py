@@ -206,6 +206,9 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
                 anchors=anchors,
                 bound=0 if later else own.bound,
                 seed=seed,
+                diffusion=own.diffusion,
+                planar=own.planar,
+                region=own.region,
             )
     return filaments
 

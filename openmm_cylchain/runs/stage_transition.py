@@ -67,6 +67,13 @@ def _change_linkers(stage, generator, columns, force):
     for name in rows:
         columns.put(name, np.concatenate([own[name] for own in parts]))
     columns.put("nextNumber", [next_number])
+    if columns.has("unboundNumbers"):
+        # Linkers that are added, or have let go, are put anywhere.
+        unbound = rows["numbers"][(rows["chains"] < 0).all(axis=1)]
+        numbers, places = columns.get("unboundNumbers"), columns.get("unboundPlaces").reshape(-1, 3)
+        stay = np.isin(numbers, unbound)
+        columns.put("unboundNumbers", numbers[stay])
+        columns.put("unboundPlaces", places[stay])
 
 
 def _let_go(rows, force):

@@ -27,6 +27,10 @@ class StateColumns:
         kind = float if node.tag == "Reals" else np.int64
         return np.array((node.get("values") or "").split(), dtype=kind)
 
+    def has(self, name: str) -> bool:
+        """Whether there is a column."""
+        return name in self._nodes
+
     def put(self, name: str, values: Any) -> None:
         """Replace a column; of real numbers to the last digit."""
         self._nodes[name].set("values", "".join(f"{value!r} " for value in np.asarray(values).ravel().tolist()))

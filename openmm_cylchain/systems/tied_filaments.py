@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Sequence
 from typing import Any
 from weakref import WeakKeyDictionary
 
+from ..couplings.shapes import Shape
 from ..engines.protocol import PlacedFilaments
 from ..errors import InputError
 from ..filaments.attachments import Attachment, distribute_beads, locate
@@ -213,6 +215,9 @@ class TiedFilaments(AddedFilaments):
         anchors: Indices | Vectors | None = None,
         bound: int = 0,
         seed: int = 0,
+        diffusion: Scalar | None = None,
+        planar: bool = False,
+        region: Shape | Sequence[Shape] | None = None,
     ) -> int:
         """Add linkers that bind to filaments, walk along them and unbind: crosslinkers or motors.
 
@@ -220,6 +225,11 @@ class TiedFilaments(AddedFilaments):
         ``binding_rate/(2 reach) v/V`` for each length of filament, where V is the volume in which unbound linkers are
         and v = (4 pi/3) R^3 with the reach R (of hands that differ, the geometric mean of both v). How many there are
         of them, and where they are bound, belongs to each Context: ``FilamentsInContext.linkers``.
+
+        With ``diffusion``, each of them has a position while it is not bound, within its region and the periodic box. A
+        hand binds to what is within its reach R of there, with the rate ``binding_rate/(2 R) (R'/R)^(3/2)`` for each
+        length of filament, R' being the reach of the other hand, and unbinds to anywhere in a sphere with the radius R,
+        but not through a wall. In equilibrium, that makes the same numbers of bound linkers.
 
         In every step, filaments stand still while linkers bind and unbind as long as the step takes; then filaments
         move, with the springs of linkers in their equations if the scheme is implicit.
@@ -240,6 +250,13 @@ class TiedFilaments(AddedFilaments):
             filament within reach begin with their only hand bound to it, as the energy of the spring has it.
         seed : int
             Of these places.
+        diffusion : length^2/time, optional
+            Diffusion coefficient of those that are not bound, of a count of linkers. Which of them bind is right where
+            they move less far in a step, (2 D h)^(1/2), than it takes to where their density is another one.
+        planar : bool
+            Whether those that are not bound stay in the plane z = 0. The factor of the rate is R'/R then.
+        region : Shape, or several, optional
+            What those that diffuse are within; the walls of the System (``filament_wall_force``) if not given.
 
         Returns
         -------
@@ -265,7 +282,8 @@ class TiedFilaments(AddedFilaments):
             )
         if self._nodes is not None:
             raise InputError("These filaments are already in a System: add linkers before.")
-        self._linkers.append(as_linkers(kind, count, concentration, volume, anchors, bound, seed))
+        own = as_linkers(kind, count, concentration, volume, anchors, bound, seed, diffusion, planar, region)
+        self._linkers.append(own)
         warn_if_springs_do_not_fit(kind, self.temperature)
         return len(self._linkers) - 1
 

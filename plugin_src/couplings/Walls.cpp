@@ -7,6 +7,33 @@
 using namespace cylchain;
 using namespace std;
 
+bool cylchain::encloses(const Wall& wall, const double* position) {
+    const double* v = wall.vector;
+    double r[3];
+    for (int k = 0; k < 3; k++)
+        r[k] = position[k]-wall.point[k];
+    switch (wall.shape) {
+        case WallShape::Plane:
+            return dot(v, r) >= 0;
+        case WallShape::Slab:
+            return fabs(dot(v, r)) <= 0.5*wall.length;
+        case WallShape::Sphere:
+            return dot(r, r) <= wall.length*wall.length;
+        case WallShape::Cylinder: {
+            const double along = dot(v, r);
+            return dot(r, r)-along*along <= wall.length*wall.length;
+        }
+        case WallShape::Box:
+            return r[0] >= 0 && r[1] >= 0 && r[2] >= 0 && position[0] <= v[0] && position[1] <= v[1] &&
+                    position[2] <= v[2];
+        case WallShape::Ellipsoid:
+            for (int k = 0; k < 3; k++)
+                r[k] /= v[k];
+            return dot(r, r) <= 1;
+    }
+    return false;
+}
+
 int cylchain::countFaces(const Wall& wall) {
     switch (wall.shape) {
         case WallShape::Slab:

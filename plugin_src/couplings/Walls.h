@@ -69,6 +69,9 @@ struct WallSystem {
 /** The most faces that a wall has. */
 const int MOST_FACES = 6;
 
+/** Whether a point is in the region. */
+bool encloses(const Wall& wall, const double* position);
+
 /** The number of faces. */
 int countFaces(const Wall& wall);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <queue>
 
 using namespace cylchain;
@@ -12,8 +13,6 @@ using namespace std;
 
 namespace {
 
-/** Linkers that a thread looks at together: enough of them pull for what is asked for AHEAD. */
-const int CHUNK = 512;
 /** Of linkers of a type that come out of their concentration in a step. */
 const int MOST_NEW_LINKERS = 10000000;
 /** The random numbers of when linkers come out of a concentration belong to this, less the number of the type. */
@@ -21,6 +20,8 @@ const uint32_t NEW_LINKERS = 0xffffffff;
 
 /** Of a length along a chain. */
 const double ROUNDING = 1e-9;
+
+const double NONE = numeric_limits<double>::quiet_NaN();
 
 uint64_t drawNumber() {
     static atomic<uint64_t> last(0);
@@ -32,7 +33,7 @@ uint64_t drawNumber() {
 LinkerKinetics::LinkerKinetics(const LinkerSystem& ofSystem, const ChainList& chains) : system(ofSystem),
         contours(chains), ownNumber(drawNumber()) {
     vector<double> different;
-    double largestSpacing = 0;
+    double largestShift = 0;
     for (const Hand& hand : system.hands) {
         vector<char> own(contours.getNumChains(), 0);
         for (int chain : hand.chains)
@@ -47,7 +48,7 @@ LinkerKinetics::LinkerKinetics(const LinkerSystem& ofSystem, const ChainList& ch
         }
         spacings.push_back(spacing);
         largestReach = max(largestReach, hand.reach);
-        largestSpacing = max(largestSpacing, hand.siteSpacing);
+        largestShift = max(largestShift, max(hand.siteSpacing, hand.atEnd.bindsThere ? hand.atEnd.range : 0));
     }
     for (const LinkerType& type : system.types) {
         anyConcentration = anyConcentration || type.concentration >= 0;
@@ -55,8 +56,9 @@ LinkerKinetics::LinkerKinetics(const LinkerSystem& ofSystem, const ChainList& ch
         for (int hand : type.hands)
             anyBinding = anyBinding || (hand >= 0 && system.hands[hand].bindingRate > 0);
     }
-    // A place that is proposed may go to the middle of its site, on another segment.
-    largestReach += largestSpacing;
+    // A place that is proposed may go to the middle of its site, or to the end, on another segment.
+    largestReach += largestShift;
+    anyDiffuses = system.anyDiffuses();
     sumLengths();
 }
 
@@ -74,7 +76,8 @@ void LinkerKinetics::sumLengths() {
     }
 }
 
-bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& cuts, LinkerState& state) {
+bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& cuts, LinkerState& state,
+        const KineticStep& step) {
     const Contours before = move(contours);
     contours = Contours(chains);
     sumLengths();
@@ -86,10 +89,13 @@ bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& 
     vector<char> isCut(contours.getNumChains(), 0);
     for (const ChainCut& cut : cuts)
         isCut[cut.chain] = 1;
+    vector<HandPlace> held;
     for (Linker& linker : state.linkers)
         for (int side = 0; side < 2; side++) {
             HandPlace& place = linker.hands[side];
             const HandPlace old = place;
+            if (anyDiffuses)
+                held.push_back(old);
             if (!old.isBound() || contours.isClosed(old.chain))
                 continue;
             const HandAtEnd& atEnd = system.hands[system.types[linker.type].hands[side]].atEnd;
@@ -108,6 +114,8 @@ bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& 
         }
     for (size_t type = 0; type < system.types.size(); type++)
         state.events[type].unbindings += count.events[type].unbindings;
+    if (anyDiffuses)
+        releaseFromEnds(state, held, before, step);
     return any;
 }
 
@@ -168,6 +176,11 @@ bool LinkerKinetics::draw(LinkerState& state, const KineticStep& step, Pending& 
             if (hand.bindingRate > 0)
                 add(Event::Propose, side, 0, proposalRate(hand)*countAround(watches[next.index], step));
         }
+        else if (type.diffuses()) {
+            if (hand.bindingRate > 0)
+                add(Event::Propose, side, 0, freeRate(type, side)*cells.getLongest()*
+                        countAroundFree(linker.type, &state.positions[3*next.index]));
+        }
         else if (type.concentration < 0)
             add(Event::Capture, side, 0, captureRate(type, side, step));
     }
@@ -192,25 +205,38 @@ bool LinkerKinetics::draw(LinkerState& state, const KineticStep& step, Pending& 
 }
 
 /** Let the event that was drawn happen, unless it is a proposal that comes to nothing. */
-void LinkerKinetics::apply(Linker& linker, const KineticStep& step, Pending& next, Sites* sites, Count& count) const {
+void LinkerKinetics::apply(LinkerState& state, const KineticStep& step, Pending& next, Sites* sites,
+        Count& count) const {
+    Linker& linker = state.linkers[next.index];
     const int side = next.event.side;
+    double* const position = system.types[linker.type].diffuses() ? &state.positions[3*next.index] : nullptr;
+    const bool wasFree = position != nullptr && isFree(linker), lastHand = position != nullptr && !linker.pulls();
     HandPlace place;
+    double center[3];
     switch (next.event.kind) {
     case Event::Unbind:
-        unbind(linker, side, sites, count);
+        if (!lastHand || findRelease(linker, side, step, next.random, position))
+            unbind(linker, side, sites, count);
         break;
     case Event::Hop:
+        if (lastHand)
+            locate(placeOf(linker, side), step.positions, step.boxes.segments, center);
         hop(linker, side, next.event.direction, sites, count);
+        if (lastHand && isFree(linker))
+            release(state, next.index, side, center, step, next.random);
         break;
     case Event::Capture:
         if (captureAnywhere(linker, side, next.random, sites, place))
             bind(linker, side, place, sites, count);
         break;
     case Event::Propose:
-        if (proposePlace(linker, side, step, next.random, sites, place))
+        if (wasFree ? proposeToFree(linker, position, side, step, next.random, sites, place) :
+                proposePlace(linker, side, step, next.random, sites, place))
             bind(linker, side, place, sites, count);
         break;
     }
+    if (position != nullptr && !isFree(linker))
+        fill(position, position+3, NONE);
 }
 
 /**
@@ -251,7 +277,7 @@ void LinkerKinetics::takeTogether(LinkerState& state, const KineticStep& step, C
             return;
         }
         if (next.index >= 0) {
-            apply(linkers[next.index], step, next, &taken, count);
+            apply(state, step, next, &taken, count);
             watches[next.index] = watch(linkers[next.index]);
             if (draw(state, step, next))
                 queue.push(next);
@@ -265,123 +291,30 @@ void LinkerKinetics::takeTogether(LinkerState& state, const KineticStep& step, C
             bind(linker, next.event.side, place, &taken, count);
             linkers.push_back(linker);
             state.clocks.push_back(0);
+            if (anyDiffuses)
+                state.positions.insert(state.positions.end(), 3, NONE);
             watches.push_back(watch(linker));
             add(linkers.size()-1, next.time);
         }
         addSource(next);
     }
-    auto walkOne = [&] (size_t i) {
+    auto walkAny = [&] (size_t i) {
         if (kinds[watches[i].kind].walks)
-            walkAll(linkers[i], step, watches[i], count);
+            walkOne(state, i, step, count);
     };
     for (const vector<int>& own : competing)
         for (int i : own)
-            walkOne(i);
+            walkAny(i);
     for (size_t i = before; i < linkers.size(); i++)
-        walkOne(i);
-}
-
-/** Find where the rates of linkers come from, by their types and what they hold. */
-void LinkerKinetics::findKinds(const KineticStep& step) {
-    kinds.assign(4*system.types.size(), Kind());
-    for (size_t number = 0; number < kinds.size(); number++) {
-        const LinkerType& type = system.types[number/4];
-        const int held = number%4;
-        Kind& kind = kinds[number];
-        // An anchor always holds its side.
-        if (type.hands[0] < 0 && (held&1) == 0)
-            continue;
-        kind.atAnchor = type.hands[0] < 0 && held == 1;
-        kind.sameChain = type.sameChain;
-        kind.needsSites = usesSites(type);
-        kind.pulls = held == 3;
-        bool known = true;
-        for (int side = 0; side < 2; side++) {
-            if (type.hands[side] < 0)
-                continue;
-            const Hand& hand = system.hands[type.hands[side]];
-            const bool hops = hand.siteSpacing > 0 && hand.speed != 0;
-            if ((held&(1<<side)) != 0) {
-                kind.rate += unbindingRate(hand, 0, 0)+(hops ? fabs(hand.speed)/hand.siteSpacing : 0);
-                kind.walks = kind.walks || (hand.speed != 0 && !hops);
-                kind.velocity = hops ? 0 : hand.speed;
-                known = known && (held != 3 || !(hand.isLoaded() || hops));
-            }
-            else if (held != 0)
-                kind.perPiece = proposalRate(hand);
-            else if (type.concentration < 0)
-                kind.rate += captureRate(type, side, step);
-        }
-        kind.rests = known && !kind.atAnchor && !kind.walks && !kind.pulls;
-        if (!known)
-            kind.rate = -1;
-    }
-}
-
-LinkerKinetics::Watch LinkerKinetics::watch(const Linker& linker) const {
-    const int held = (linker.isHeld(0) ? 1 : 0)+(linker.isHeld(1) ? 2 : 0);
-    // That of nothing around.
-    Watch watch = {4*linker.type+held, 2*cells.getNumPieces()};
-    if (held == 0 || held == 3 || !anyBinding)
-        return watch;
-    const HandPlace& hand = linker.hands[held-1];
-    if (hand.isBound()) {
-        const int segment = contours.findSegment(hand.chain, hand.position);
-        const int piece = cells.findPiece(contours, segment, hand.position-contours.getStart(segment));
-        watch.where = system.types[linker.type].sameChain ? piece : cells.getNumPieces()+piece;
-    }
-    else
-        watch.where = linker.anchor;
-    return watch;
-}
-
-/** Derive what follows from a state, unless it is the one that the last step left. */
-void LinkerKinetics::know(LinkerState& state) {
-    if (state.knownTo.number == ownNumber && known == &state)
-        return;
-    known = &state;
-    const vector<Linker>& linkers = state.linkers;
-    state.clocks.resize(linkers.size(), 0);
-    state.events.resize(system.types.size());
-    watches.clear();
-    taken.clear();
-    for (const Linker& linker : linkers) {
-        watches.push_back(watch(linker));
-        const LinkerType& type = system.types[linker.type];
-        for (int side = 0; side < 2; side++)
-            if (linker.hands[side].isBound() && spacings[type.hands[side]] >= 0)
-                taken.insert(siteOf(system.hands[type.hands[side]], linker.hands[side]));
-    }
-    state.knownTo.number = ownNumber;
-}
-
-/** Find where anchors are among the cells: points stay where they are as long as the grid does. */
-void LinkerKinetics::findMarks(const KineticStep& step) {
-    const bool all = gridOfMarks != cells.getGridNumber() || marks.size() != system.anchors.size();
-    marks.resize(system.anchors.size());
-    for (size_t anchor = 0; anchor < marks.size(); anchor++)
-        if (all || !system.anchors[anchor].isPoint()) {
-            double place[3];
-            locate(system.anchors[anchor], step.positions, step.boxes.segments, place);
-            marks[anchor] = cells.findMark(place);
-        }
-    gridOfMarks = cells.getGridNumber();
-}
-
-/** How many pieces are around a linker to which it could bind. */
-int LinkerKinetics::countAround(const Watch& watch, const KineticStep& step) const {
-    if (!kinds[watch.kind].atAnchor)
-        return cells.getNumbersAround()[watch.where];
-    if (!cells.isNear(marks[watch.where]))
-        return 0;
-    double place[3];
-    locate(system.anchors[watch.where], step.positions, step.boxes.segments, place);
-    return cells.lookAround(place).numPieces;
+        walkAny(i);
 }
 
 /** The sum of the rates of a linker; -1 if that depends on its spring. */
-double LinkerKinetics::findRate(const Watch& watch, const KineticStep& step) const {
+double LinkerKinetics::findRate(const LinkerState& state, int index, const KineticStep& step) const {
+    const Watch& watch = watches[index];
     const Kind& kind = kinds[watch.kind];
+    if (kind.isFree)
+        return kind.perPiece > 0 ? kind.perPiece*countAroundFree(watch.kind/4, &state.positions[3*index]) : 0;
     if (kind.rate < 0 || !(kind.perPiece > 0))
         return kind.rate;
     return kind.rate+kind.perPiece*countAround(watch, step);
@@ -435,6 +368,8 @@ void LinkerKinetics::advanceChunk(LinkerState& state, const KineticStep& step, i
     pulling[chunk].clear();
     competing[chunk].clear();
     const int* const around = cells.getNumbersAround();
+    if (anyDiffuses)
+        diffuse(state, step, first, last);
     for (int i = first; i < last; i++) {
         if (i+AHEAD < last && looksAtPiece(watches[i+AHEAD]))
             prefetch(&cells.getPiece(pieceOf(watches[i+AHEAD])));
@@ -443,7 +378,7 @@ void LinkerKinetics::advanceChunk(LinkerState& state, const KineticStep& step, i
         const Kind& kind = kinds[own.kind];
         if (kind.rests && passes(state.clocks[i], kind.rate+kind.perPiece*around[own.where], step.stepSize))
             continue;
-        if (kind.rests || !passes(state.clocks[i], findRate(own, step), step.stepSize)) {
+        if (kind.rests || !passes(state.clocks[i], findRate(state, i, step), step.stepSize)) {
             Linker& linker = state.linkers[i];
             if (kind.needsSites) {
                 competing[chunk].push_back(i);
@@ -451,14 +386,14 @@ void LinkerKinetics::advanceChunk(LinkerState& state, const KineticStep& step, i
             }
             Pending next = {0, RandomNumbers(key, step.force, linker.number), i, linker.type, {}, 0};
             while (next.events <= MOST_EVENTS && draw(state, step, next)) {
-                apply(linker, step, next, nullptr, count);
+                apply(state, step, next, nullptr, count);
                 own = watch(linker);
             }
             if (next.events > MOST_EVENTS)
                 count.failed = linker.number;
         }
         if (kinds[own.kind].walks)
-            walkAll(state.linkers[i], step, own, count);
+            walkOne(state, i, step, count);
         if (kinds[own.kind].pulls)
             pulling[chunk].push_back(i);
     }
@@ -472,16 +407,20 @@ void LinkerKinetics::removeUnbound(LinkerState& state) {
             continue;
         state.linkers[kept] = state.linkers[i];
         state.clocks[kept] = state.clocks[i];
+        if (anyDiffuses)
+            copy(&state.positions[3*i], &state.positions[3*i]+3, &state.positions[3*kept]);
         watches[kept++] = watches[i];
     }
     state.linkers.resize(kept);
     state.clocks.resize(kept);
+    state.positions.resize(anyDiffuses ? 3*kept : 0);
     watches.resize(kept);
 }
 
 long long LinkerKinetics::advance(LinkerState& state, const KineticStep& step, const Loop& loop, vector<Link>* links) {
     if (anyBinding)
-        cells.build(contours, step.positions, largestReach, step.boxes.distances, step.boxes.segments, anyAnchors);
+        cells.build(contours, step.positions, largestReach, step.boxes.distances, step.boxes.segments, anyAnchors,
+                anyDiffuses);
     if (anyBinding && anyAnchors)
         findMarks(step);
     findKinds(step);

@@ -3,6 +3,7 @@
 
 #include "couplings/Contours.h"
 #include "couplings/Links.h"
+#include "kinetics/LinkerRegion.h"
 #include "kinetics/Linkers.h"
 #include "kinetics/RandomNumbers.h"
 #include "kinetics/SegmentCells.h"
@@ -44,6 +45,13 @@ struct KineticStep {
  * process and its inverse are equally likely in equilibrium, whatever the step is. Binding is drawn by thinning: places
  * are proposed along all segments around, and accepted by their energy.
  *
+ * Linkers of a type that diffuses have positions while they are not bound. In a step they move first, with the
+ * coefficient D; a hand then binds with the rate c (R'/R)^(3/2) for each length of chains within its own reach R of the
+ * position, R' being that of the other hand, and unbinds to anywhere in a sphere with the radius R. With the density n
+ * of linkers, that is the rate c v n for each length of chains, and one way is as likely as the other: numbers in
+ * equilibrium are those without positions. In the plane, v is the area pi R_1 R_2, and the rate c R'/R. Neither moves
+ * nor unbinding leave the region; what would do so does not happen, and the same is missing on the way back.
+ *
  * Each linker has a clock: the integral of its rates over time until its next event. Steps take it down, and only where
  * it runs out is anything drawn. Most rates follow from the type of a linker, from what it holds, and from how many
  * pieces of chains are around the piece that it holds: a step looks at two numbers of a linker, and nothing else.
@@ -61,13 +69,23 @@ public:
     void setTemperature(double kT) {
         system.kT = kT;
     }
+    /** Set within which walls linkers are that diffuse. */
+    void setWalls(const std::vector<Wall>& walls) {
+        system.walls = walls;
+    }
+    /** Give positions to linkers that diffuse and have none; false if there is no room within the walls. */
+    bool placeFree(LinkerState& state, const KineticStep& step) const {
+        return placeFreeLinkers(state, system, step.boxes.distances, step.seed, step.force);
+    }
     /**
      * Take note that chains have grown, shrunk, or were cut. Hands beyond an end let go, or stay there.
      *
      * @param cuts  where chains were cut, one after the other: hands keep their lengths along them
+     * @param step  where chains are, and to which random numbers belong
      * @return whether there were any such hands, or hands on other chains than before
      */
-    bool setChains(const ChainList& chains, const std::vector<ChainCut>& cuts, LinkerState& state);
+    bool setChains(const ChainList& chains, const std::vector<ChainCut>& cuts, LinkerState& state,
+            const KineticStep& step);
     /**
      * Take a step.
      *
@@ -90,6 +108,8 @@ private:
     struct Pending;
     /** After so many events of a linker in a step, or so many rounds of a ring, something is wrong with rates. */
     static constexpr int MOST_EVENTS = 100000;
+    /** Linkers that a thread looks at together: enough of them pull for what is asked for ahead. */
+    static constexpr int CHUNK = 512;
     struct Count {
         /** Of each type. */
         std::vector<LinkerEvents> events;
@@ -103,11 +123,19 @@ private:
         double perPiece = 0;
         /** Of a hand that walks without a load, towards the plus end, if the linker holds nothing else. */
         double velocity = 0;
+        /** Of linkers that are not bound and have positions. */
+        double diffusion = 0;
+        /** If not zero, they are taken to have so many pieces around them, wherever they are. */
+        unsigned most = 0;
+        bool isFree = false, isPlanar = false;
         bool atAnchor = false, sameChain = false, walks = false, needsSites = false, pulls = false;
         /** Whether a step has nothing to do for it as long as its clock does not run out. */
         bool rests = false;
     };
-    /** What a step needs to know of a linker: its kind, and its anchor, or where the number around its piece is. */
+    /**
+     * What a step needs to know of a linker: its kind, and its anchor, or where the number around its piece is; the
+     * number of one that is free.
+     */
     struct Watch {
         int kind = 0, where = -1;
     };
@@ -124,7 +152,7 @@ private:
     void walk(Linker& linker, const KineticStep& step, Count& count) const;
     void walkPart(Linker& linker, const KineticStep& step, double duration, Count& count) const;
     bool draw(LinkerState& state, const KineticStep& step, Pending& next) const;
-    void apply(Linker& linker, const KineticStep& step, Pending& next, Sites* sites, Count& count) const;
+    void apply(LinkerState& state, const KineticStep& step, Pending& next, Sites* sites, Count& count) const;
     void stayOnChain(Linker& linker, int side, Count& count) const;
     void walkAll(Linker& linker, const KineticStep& step, Watch& watch, Count& count) const;
     void sumLengths();
@@ -134,9 +162,26 @@ private:
     Watch watch(const Linker& linker) const;
     int pieceOf(const Watch& watch) const;
     bool looksAtPiece(const Watch& watch) const;
+    double freeRate(const LinkerType& type, int side) const;
+    unsigned countAroundFree(int type, const double* position) const {
+        const unsigned most = kinds[4*type].most;
+        return most > 0 ? most : cells.getMostAround(position);
+    }
+    bool isFree(const Linker& linker) const;
+    void diffuse(LinkerState& state, const KineticStep& step, int first, int last) const;
+    bool proposeToFree(const Linker& linker, const double* position, int side, const KineticStep& step,
+            RandomNumbers& random, const Sites* sites, HandPlace& found) const;
+    bool findRelease(const Linker& linker, int side, const KineticStep& step, RandomNumbers& random,
+            double* position) const;
+    void release(LinkerState& state, std::size_t index, int side, const double* center, const KineticStep& step,
+            RandomNumbers& random) const;
+    void walkOne(LinkerState& state, std::size_t index, const KineticStep& step, Count& count);
+    void releaseFromEnds(LinkerState& state, const std::vector<HandPlace>& held, const Contours& before,
+            const KineticStep& step) const;
+    bool toProposed(int number, const SegmentPiece& piece, double where, const Sites* sites, HandPlace& found) const;
     void addLink(const Linker& linker, std::vector<Link>& links) const;
     int countAround(const Watch& watch, const KineticStep& step) const;
-    double findRate(const Watch& watch, const KineticStep& step) const;
+    double findRate(const LinkerState& state, int index, const KineticStep& step) const;
     bool passes(double& clock, double rate, double stepSize) const;
     void advanceChunk(LinkerState& state, const KineticStep& step, int chunk);
     void removeUnbound(LinkerState& state);
@@ -164,7 +209,7 @@ private:
     /** For each type and what its linkers hold. */
     std::vector<Kind> kinds;
     double largestReach = 0;
-    bool anySites = false, anyConcentration = false, anyAnchors = false, anyBinding = false;
+    bool anySites = false, anyConcentration = false, anyAnchors = false, anyBinding = false, anyDiffuses = false;
     SegmentCells cells;
     /** Of anchors, while the grid of cells is what it was. */
     std::vector<std::uint32_t> marks;

@@ -252,6 +252,20 @@ const SegmentCells::Around& LinkerKinetics::lookAround(const Linker& linker, int
     return cells.lookAround(cells.findPiece(contours, segment, hand.position-contours.getStart(segment)));
 }
 
+/** Find the place of a hand on a piece, at a share of the longest one; false if there is none, or none that is free. */
+bool LinkerKinetics::toProposed(int number, const SegmentPiece& piece, double where, const Sites* sites,
+        HandPlace& found) const {
+    const Hand& hand = system.hands[number];
+    const double along = where*cells.getLongest();
+    found.chain = contours.getChain(piece.segment);
+    found.position = contours.getStart(piece.segment)+piece.start+along;
+    if (along > piece.length || binds[number][found.chain] == 0)
+        return false;
+    if (hand.siteSpacing > 0 && (!toSite(hand, found) || sites->count(siteOf(hand, found)) > 0))
+        return false;
+    return !hand.atEnd.bindsThere || toEnd(hand, found);
+}
+
 /** Propose a place where a hand could bind; true if it binds there. */
 bool LinkerKinetics::proposePlace(const Linker& linker, int side, const KineticStep& step, RandomNumbers& random,
         const Sites* sites, HandPlace& found) const {
@@ -264,16 +278,8 @@ bool LinkerKinetics::proposePlace(const Linker& linker, int side, const KineticS
     if (around.numPieces == 0)
         return false;
     const int chosen = min(around.numPieces-1, static_cast<int>(which*around.numPieces));
-    const SegmentPiece& piece = cells.getAround(around, chosen);
-    const double along = where*cells.getLongest();
-    found.chain = contours.getChain(piece.segment);
-    found.position = contours.getStart(piece.segment)+piece.start+along;
-    if (along > piece.length || binds[number][found.chain] == 0 ||
+    if (!toProposed(number, cells.getAround(around, chosen), where, sites, found) ||
             (!type.sameChain && linker.hands[1-side].chain == found.chain))
-        return false;
-    if (hand.siteSpacing > 0 && (!toSite(hand, found) || sites->count(siteOf(hand, found)) > 0))
-        return false;
-    if (hand.atEnd.bindsThere && !toEnd(hand, found))
         return false;
     double from[3], vector[3];
     locate(placeOf(linker, 1-side), step.positions, step.boxes.segments, from);

@@ -2,6 +2,7 @@
 #define CYLCHAIN_LINKERS_H_
 
 #include "couplings/Place.h"
+#include "couplings/Walls.h"
 #include "mechanics/ChainList.h"
 #include <cstddef>
 #include <cstdint>
@@ -82,6 +83,17 @@ struct LinkerType {
     double volume = 0;
     /** If not negative, there are always this many unbound linkers in a volume, beside those that are bound. */
     double concentration = -1;
+    /**
+     * If not negative, linkers that are not bound have positions of their own, with this diffusion coefficient. Those
+     * that are planar stay in the plane z = 0.
+     */
+    double diffusion = -1;
+    bool planar = false;
+    /** What they are within then; those of the System if there are none. */
+    std::vector<Wall> walls = {};
+    bool diffuses() const {
+        return diffusion >= 0;
+    }
 };
 
 /** What holds chains that begin as branches by a nucleator: a linker of each of some types. */
@@ -159,6 +171,8 @@ struct LinkerState {
      * with the mean 1; if it is not positive, or not there, it is drawn when it is needed.
      */
     std::vector<double> clocks;
+    /** Of each linker that diffuses and is not bound, three numbers, and NaN of others; empty if none diffuses. */
+    std::vector<double> positions;
     std::uint32_t nextNumber = 0;
     /** How many steps have been taken. */
     std::uint64_t steps = 0;
@@ -176,6 +190,17 @@ struct LinkerSystem {
     std::vector<LinkerType> types;
     std::vector<Place> anchors;
     double kT = 0;
+    /** Linkers that diffuse are within all of these, or those of their type. */
+    std::vector<Wall> walls = {};
+    const std::vector<Wall>& wallsOf(const LinkerType& type) const {
+        return type.walls.empty() ? walls : type.walls;
+    }
+    bool anyDiffuses() const {
+        for (const LinkerType& type : types)
+            if (type.diffuses())
+                return true;
+        return false;
+    }
 };
 
 } // namespace cylchain

@@ -1,6 +1,7 @@
 #include "kinetics/SegmentCells.h"
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 using namespace cylchain;
 using namespace std;
@@ -11,6 +12,16 @@ static const double LARGEST_COORDINATE = 1e9;
 static const double GROWTH = 1.02;
 /** Of a segment: hands that reach less far have longer pieces, and more proposals that come to nothing. */
 static const double MOST_PIECES = 1000;
+/** Counts have so many bits less for their marks: these are read at random, and should be near. */
+static const int COUNT_BITS_LESS = 3;
+
+/** floor(), which the oldest processors do not have as an instruction. */
+static inline double roundDown(double x) {
+    if (!(fabs(x) < 1e15))
+        return floor(x);
+    const double whole = static_cast<double>(static_cast<int64_t>(x));
+    return whole > x ? whole-1 : whole;
+}
 
 void SegmentCells::setGrid(double size, const double* box) {
     double changed[9] = {};
@@ -41,7 +52,7 @@ void SegmentCells::findCoordinates(const double* point, int* coordinates) const 
     if (numCells[0] == 0) {
         for (int k = 0; k < 3; k++)
             coordinates[k] = static_cast<int>(min(LARGEST_COORDINATE, max(-LARGEST_COORDINATE,
-                    floor(toCells[4*k]*point[k]))));
+                    roundDown(toCells[4*k]*point[k]))));
         return;
     }
     for (int k = 0; k < 3; k++) {
@@ -50,7 +61,7 @@ void SegmentCells::findCoordinates(const double* point, int* coordinates) const 
         for (int j = k; j < 3; j++)
             coordinate += toCells[3*k+j]*point[j];
         const int n = numCells[k];
-        coordinate = floor(coordinate-n*floor(coordinate/n));
+        coordinate = roundDown(coordinate-n*roundDown(coordinate/n));
         coordinates[k] = static_cast<int>(min(n-1.0, max(0.0, coordinate)));
     }
 }
@@ -173,6 +184,7 @@ void SegmentCells::cut(const Contours& contours, double reach) {
     lastMark = (static_cast<uint32_t>(1)<<min(31, slotBits+5))-1;
     held.resize((lastMark>>6)+2);
     near.resize(held.size());
+    lastCount = lastMark>>COUNT_BITS_LESS;
     gridNumber++;
 }
 
@@ -218,7 +230,7 @@ double SegmentCells::findVectors(const Contours& contours, const double* positio
 }
 
 void SegmentCells::build(const Contours& contours, const double* positions, double reach, const double* box,
-            const double* segmentBox, bool forPoints) {
+            const double* segmentBox, bool forPoints, bool forCounts) {
     if (reach != reachOfPieces)
         cut(contours, reach);
     const int segments = contours.getNumSegments();
@@ -258,6 +270,8 @@ void SegmentCells::build(const Contours& contours, const double* positions, doub
     sortAll();
     if (forPoints)
         markAround();
+    if (forCounts)
+        countAround();
 }
 
 /** Sort pieces into cells, and find what is around each cell. */
@@ -328,20 +342,38 @@ void SegmentCells::lookAhead(int cell) {
     }
 }
 
+/** Call a function with the mark of each cell around one. */
+template <class Function> void SegmentCells::forMarksAround(const Cell& cell, Function function) const {
+    int x[3] = {}, y[3] = {}, z[3] = {};
+    const int numX = findNeighbours(cell.coordinates[0], 0, x), numY = findNeighbours(cell.coordinates[1], 1, y);
+    const int numZ = findNeighbours(cell.coordinates[2], 2, z);
+    for (int k = 0; k < numZ; k++)
+        for (int j = 0; j < numY; j++)
+            for (int i = 0; i < numX; i++) {
+                const int other[3] = {x[i], y[j], z[k]};
+                function(markOf(other));
+            }
+}
+
 /** Mark all cells that have one which holds something around them. */
 void SegmentCells::markAround() {
     fill(near.begin(), near.end(), 0);
-    for (const Cell& cell : cells) {
-        int x[3] = {}, y[3] = {}, z[3] = {};
-        const int numX = findNeighbours(cell.coordinates[0], 0, x), numY = findNeighbours(cell.coordinates[1], 1, y);
-        const int numZ = findNeighbours(cell.coordinates[2], 2, z);
-        for (int k = 0; k < numZ; k++)
-            for (int j = 0; j < numY; j++)
-                for (int i = 0; i < numX; i++) {
-                    const int other[3] = {x[i], y[j], z[k]};
-                    mark(near, markOf(other));
-                }
-    }
+    for (const Cell& cell : cells)
+        forMarksAround(cell, [&] (uint32_t number) {
+            mark(near, number);
+        });
+}
+
+/** Add the number of pieces in each cell to the marks of those around it. */
+void SegmentCells::countAround() {
+    counts.assign(static_cast<size_t>(lastCount)+1, 0);
+    mostOfAll = 0;
+    for (const Cell& cell : cells)
+        forMarksAround(cell, [&] (uint32_t number) {
+            unsigned& own = counts[number&lastCount];
+            own += cell.count;
+            mostOfAll = max(mostOfAll, own);
+        });
 }
 
 const SegmentPiece& SegmentCells::getAround(const Around& found, int number) const {

@@ -38,9 +38,10 @@ public:
      * @param box         the periodic box if distances are those of nearest images, or NULL
      * @param segmentBox  the box in which the second end of a segment is that nearest to the first, or NULL
      * @param forPoints   whether isNear() is going to be asked
+     * @param forCounts   whether getMostAround() is
      */
     void build(const Contours& contours, const double* positions, double reach, const double* box,
-            const double* segmentBox, bool forPoints);
+            const double* segmentBox, bool forPoints, bool forCounts = false);
     /** Take note that segments are others than those that were cut. */
     void forgetSegments() {
         reachOfPieces = 0;
@@ -81,6 +82,16 @@ public:
     bool isNear(std::uint32_t mark) const {
         return (near[mark>>6]>>(mark&63)&1) != 0;
     }
+    /** At least how many pieces are around a point, and mostly as many: marks have sums over cells. */
+    unsigned getMostAround(const double* point) const {
+        int coordinates[3];
+        findCoordinates(point, coordinates);
+        return counts[markOf(coordinates)&lastCount];
+    }
+    /** The largest number of getMostAround(). */
+    unsigned getMostOfAll() const {
+        return mostOfAll;
+    }
     std::uint64_t getGridNumber() const {
         return gridNumber;
     }
@@ -115,6 +126,8 @@ private:
     void see(int cell, int other);
     void sortAll();
     void markAround();
+    void countAround();
+    template <class Function> void forMarksAround(const Cell& cell, Function function) const;
     /** The vectors that take a point to its coordinates in cells, and how many there are along axes of a box, or 0. */
     double toCells[9] = {};
     int numCells[3] = {0, 0, 0};
@@ -133,7 +146,10 @@ private:
     std::vector<int> slots;
     /** A bit for each cell, and for each one beside a cell; others may have the same. */
     std::vector<std::uint64_t> held, near;
-    std::uint32_t lastMark = 0;
+    /** How many pieces are around cells, by their marks. */
+    std::vector<unsigned> counts = std::vector<unsigned>(1, 0);
+    unsigned mostOfAll = 0;
+    std::uint32_t lastMark = 0, lastCount = 0;
     int slotShift = 0;
 };
 

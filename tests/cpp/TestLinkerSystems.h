@@ -126,7 +126,7 @@ inline Expected expectedOn(const Rods& rods, const LinkerSystem& system, double 
                 for (int k = 0; k < 3; k++)
                     d += (u[k]-v[k])*(u[k]-v[k]);
                 d = sqrt(d);
-                if (d > a.reach)
+                if (d > min(a.reach, b.reach))
                     continue;
                 const double energy = 0.5*type.stiffness*(d-type.restLength)*(d-type.restLength);
                 const double weight = inVolume*ofA*ofB*exp(-energy/system.kT)*length*other/points/points;
@@ -138,11 +138,11 @@ inline Expected expectedOn(const Rods& rods, const LinkerSystem& system, double 
     return {1/all, one/all, both/all, square/both};
 }
 
-inline void checkEquilibrium(const Rods& rods, double stiffness, double restLength, double reach, double share,
-        double stepSize) {
+/** Two different hands that bind to both rods, on a spring. */
+inline LinkerSystem twoHands(double stiffness, double restLength, double reach, double other, double share) {
     LinkerSystem system;
     system.kT = KT;
-    system.hands = {handOf(0.3, reach, 1, {0, 1}), handOf(0.6, reach, 0.5, {0, 1})};
+    system.hands = {handOf(0.3, reach, 1, {0, 1}), handOf(0.6, other, 0.5, {0, 1})};
     system.hands[0].strainShare = share;
     system.hands[1].strainShare = 0.5*share;
     LinkerType type;
@@ -151,13 +151,14 @@ inline void checkEquilibrium(const Rods& rods, double stiffness, double restLeng
     type.stiffness = stiffness;
     type.restLength = restLength;
     system.types = {type};
-    KineticStep step = stepOf(rods.x, stepSize);
-    step.volume = 1.2e9;
-    const Expected expected = expectedOn(rods, system, step.volume);
-    LinkerKinetics kinetics(system, rods.chains);
-    LinkerState state = freeLinkers(2000);
+    return system;
+}
+
+/** Linkers on two rods that are 100 long: how many hold nothing, and where. */
+inline void checkEquilibrium(LinkerKinetics& kinetics, LinkerState& state, const KineticStep& step,
+        const Expected& expected) {
     // Longer than a hand stays bound.
-    const int interval = max(1, (int) (3/stepSize)), blocks = 20, samples = 5;
+    const int interval = max(1, (int) (3/step.stepSize)), blocks = 20, samples = 5;
     for (int i = 0; i < 10*interval; i++)
         kinetics.advance(state, step, SERIAL);
     Mean unbound, one, both, square;
@@ -183,6 +184,16 @@ inline void checkEquilibrium(const Rods& rods, double stiffness, double restLeng
     one.check("one hand bound", expected.one);
     both.check("both hands bound", expected.both);
     square.check("places", expected.square);
+}
+
+inline void checkEquilibrium(const Rods& rods, double stiffness, double restLength, double reach, double share,
+        double stepSize) {
+    const LinkerSystem system = twoHands(stiffness, restLength, reach, reach, share);
+    KineticStep step = stepOf(rods.x, stepSize);
+    step.volume = 1.2e9;
+    LinkerKinetics kinetics(system, rods.chains);
+    LinkerState state = freeLinkers(2000);
+    checkEquilibrium(kinetics, state, step, expectedOn(rods, system, step.volume));
 }
 
 const double ORIGIN[] = {0, 0, 0}, ALONG_X[] = {1, 0, 0};

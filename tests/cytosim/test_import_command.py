@@ -94,7 +94,7 @@ def test_every_place_says_what_was_done(tmp_path, capsys):
     said = capsys.readouterr()
     assert said.err == ""
     assert re.search(r"exact: \d+ settings", said.out)
-    assert "linkers that diffuse by themselves" in said.out and "specificity = parallel (line 31)" in said.out
+    assert "rules for pairs of hands" in said.out and "specificity = parallel (line 31)" in said.out
     lines = (tmp_path / "my.toml").read_text().splitlines()
     # Numbers and names that say themselves what they are.
     unsaid = [line for line in lines if "=" in line and "#" not in line]

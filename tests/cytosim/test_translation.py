@@ -106,10 +106,20 @@ def test_hands_bind_from_solution_in_the_plane(tmp_path):
     assert all(group.planar for group in found.filaments)
 
 
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_couples_diffuse_in_their_space(tmp_path, dimensions):
+    text = TUBE + HAND + COUPLE.replace("fast", "0.3") + "new 4 tube { length = 3 }\nnew 50 link\n"
+    found, document = translated(tmp_path, text, SYSTEM.replace("dim = 3", f"dim = {dimensions}"))
+    assert document.missing == []
+    (linkers,) = found.linkers
+    assert linkers.diffusion == pytest.approx(0.3e-6) and linkers.volume is None
+    assert linkers.planar == (dimensions == 2)
+    assert linkers.region[0].radius == pytest.approx(4e3)
+
+
 @pytest.mark.parametrize(
     ("couple", "missing"),
     [
-        ("diffusion = 10", "linkers that diffuse by themselves"),
         ("diffusion = fast; specificity = parallel", "rules for pairs of hands"),
         ("diffusion = fast; trans_activated = 1", "rules for pairs of hands"),
         ("diffusion = fast; activity = fork; torque = 1, 1", "links that hold an angle (fork)"),

@@ -303,6 +303,31 @@ def test_particles():
     assert step.step > 0
 
 
+@pytest.mark.parametrize(
+    ("before", "lines", "message"),
+    [
+        ("", 'diffusion = "1 um^2/s"\n', "need a region"),
+        ("", 'diffusion = "-1 um^2/s"\n', "diffusion"),
+        (BOX, 'diffusion = "1 um^2/s"\nvolume = "1 um^3"\n', "neither a volume"),
+        (BOX, "planar = true\n", "give their diffusion"),
+        (BOX, 'inside = { shape = "sphere", radius = "1 um" }\n', "give their diffusion"),
+        ("", 'diffusion = "1 um^2/s"\ninside = { shape = "cylinder", radius = "1 um" }\n', "length"),
+    ],
+)
+def test_regions_of_linkers_that_diffuse_are_checked(before, lines, message):
+    with pytest.raises(InputError, match=message):
+        parse(before, LINKERS + lines)
+
+
+def test_linkers_that_diffuse():
+    own = 'diffusion = "2 um^2/s"\nplanar = true\ninside = { shape = "cylinder", radius = "1 um", length = "2 um" }\n'
+    (linkers,) = built("", LINKERS + own).filaments.linkers
+    assert linkers.diffusion == pytest.approx(2e-6) and linkers.planar and linkers.volume is None
+    cylinder, slab = linkers.region
+    assert cylinder.radius == 1000.0 and slab.thickness == 2000.0
+    assert built(BOX, LINKERS + 'diffusion = "2 um^2/s"\n').filaments.linkers[0].region == ()
+
+
 def test_particles_and_linkers_have_a_recommended_step():
     tables = BOX + PARTICLES + '[[linkers]]\ntype = "ALPHA_ACTININ"\ncount = 5\n'
     assert parse(tables, simulation=TAIL.replace('"1 us"', '"recommended"')).simulation.time_step > 0

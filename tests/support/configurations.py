@@ -188,6 +188,7 @@ position = ["0 nm", "0 nm", "0 nm"]
 type = "MYOSIN_II"
 count = 200
 bound = 50
+diffusion = "1 um^2/s"
 [contacts]
 diameter = "10 nm"
 [[wall]]
@@ -284,7 +285,8 @@ debranching_force = "50 pN"
 type = "ALPHA_ACTININ"
 hand = { reach = "60 nm", binds_to = "ACT", severing_rate = "0.1 1/s" }
 count = 20
-volume = "4 um^3"
+diffusion = "0.1 um^2/s"
+inside = { shape = "cylinder", radius = "500 nm", length = "1 um" }
 [[wall]]
 shape = "sphere"
 radius = "1 um"

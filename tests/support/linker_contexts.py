@@ -12,7 +12,8 @@ PICONEWTON = 0.602214076
 
 def same_linkers(first, second):
     """Whether two LinkerTables are equal to the bit."""
-    return all(np.array_equal(getattr(first, name), getattr(second, name)) for name in first.__dataclass_fields__)
+    names = first.__dataclass_fields__
+    return all(np.array_equal(getattr(first, name), getattr(second, name), equal_nan=True) for name in names)
 
 
 def check_that_runs_go_on_to_the_bit(network):

@@ -11,14 +11,14 @@ from ...filaments.end_states import ENDS
 from ...kinetics.crosslinker import Crosslinker
 from ...kinetics.hand import AT_ENDS, Hand
 from ...kinetics.hand_at_end import HandAtEnd
-from ...kinetics.linkers import as_linkers
+from ...kinetics.linkers import as_linkers, is_closed
 from ...kinetics.presets import PRESETS
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Flag, Inline, Key, Listing, Number, Pair, Quantity, Text, Whole, as_written, point
 from ..table import Entries, TableKind
 from .filament_types import PRESETS as FILAMENT_PRESETS
 from .nucleation import has_places
-from .shapes import volume_within
+from .shapes import REGION, REGION_EXAMPLE, Region, volume_within
 from .solvent import EDGES
 
 _QUANTITIES = {
@@ -173,6 +173,19 @@ LINKERS = TableKind(
             None,
             "Volume in which unbound linkers are; what the wall and the box leave if not given.",
         ),
+        Key(
+            "diffusion",
+            Quantity(units.DIFFUSION, "zero"),
+            None,
+            "Diffusion coefficient of unbound linkers, which have positions then: within walls and the box.",
+        ),
+        Key(
+            "inside",
+            Inline(REGION, REGION_EXAMPLE),
+            None,
+            "A region in which unbound linkers diffuse; what walls and the box leave if not given.",
+        ),
+        Key("planar", Flag(), False, "Whether unbound linkers that diffuse stay in the plane z = 0."),
         Key("anchors", _Anchors(), None, "Points to which they are tied, one each, in place of their first hands."),
         Key("bound", Whole(0, 10**7, "100"), 0, "How many begin with one hand bound, at random or near anchors."),
         Key(
@@ -187,6 +200,9 @@ LINKERS = TableKind(
 )
 
 
+_BEFORE_ANCHORS, _BEHIND_ANCHORS = ("count", "concentration", "volume"), ("bound", "diffusion", "planar")
+
+
 @dataclass(frozen=True)
 class LinkerGroup:
     """One [[linkers]] table; lengths in nm, anchors as points or as numbers of particles."""
@@ -197,17 +213,28 @@ class LinkerGroup:
     volume: float | None
     anchors: tuple | None
     bound: int
+    diffusion: float | None
+    planar: bool
+    region: tuple | None
     keep: str = "all"
 
 
 def read_linkers(entries, groups, box, seed, walls=()):
     """The LinkerGroup of a [[linkers]] table, for FilamentGroups; the seed is that of anchors at random places."""
     anchors = _anchor_points(entries, sum(own.count * own.nodes for own in groups), seed, box, walls)
-    names = ("count", "concentration", "volume")
-    group = LinkerGroup(_kind(entries), *(entries[name] for name in names), anchors, entries["bound"], entries["keep"])
+    first, last = (tuple(entries[name] for name in names) for names in (_BEFORE_ANCHORS, _BEHIND_ANCHORS))
+    region = None if entries["inside"] is None else Region(entries["inside"]).walls
+    group = LinkerGroup(_kind(entries), *first, anchors, *last, region, entries["keep"])
     with entries.naming():
-        as_linkers(group.kind, group.count, group.concentration, group.volume, group.anchors, group.bound, 0)
-    if group.count is not None and group.volume is None and (box is None or walls):
+        as_linkers(group.kind, *first, group.anchors, group.bound, 0, group.diffusion, group.planar, region)
+    if group.diffusion is not None:
+        if region is None and not is_closed([wall.shape.region for wall in walls], box is not None):
+            raise entries.error(
+                f"linkers that diffuse need a region: inside = {REGION_EXAMPLE}, a [[wall]] that is closed (a sphere, "
+                f"an ellipsoid or a box), or a periodic [box] with edges = {EDGES.example}, in which there may be a "
+                "slit or a cylinder."
+            )
+    elif group.count is not None and group.volume is None and (box is None or walls):
         group = dataclasses.replace(group, volume=_volume(entries, [wall.shape for wall in walls], box))
     names = sorted({own.type.name for own in groups})
     for hand in group.kind.hands:

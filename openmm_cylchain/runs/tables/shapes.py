@@ -44,7 +44,7 @@ REGION = TableKind(
         *(key for key in _KEYS if key.name not in ("normal", "thickness")),
         Key("length", Quantity(units.LENGTH), None, "Length of a cylinder, half of it on either side of its point."),
     ),
-    "A region in which filaments or particles begin.",
+    "A region in which filaments or particles begin, or linkers diffuse.",
 )
 REGION_EXAMPLE = '{ shape = "sphere", radius = "1 um" }'
 
@@ -81,6 +81,13 @@ class Region:
     def shape(self):
         """The Shape that it is within."""
         return self._shape
+
+    @property
+    def walls(self):
+        """Tuple of the Shapes that it is within: a cylinder has a Slab across it."""
+        if self._length is None:
+            return (self._shape,)
+        return (self._shape, Slab(self._shape.point, self._shape.axis, self._length))
 
     @property
     def volume(self):

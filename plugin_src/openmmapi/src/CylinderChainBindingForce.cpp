@@ -1,4 +1,5 @@
 #include "openmm/CylinderChainBindingForce.h"
+#include "openmm/CylinderChainWallForce.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/internal/AssertionUtilities.h"
 #include "openmm/internal/CylinderChainBindingForceImpl.h"
@@ -172,6 +173,37 @@ void CylinderChainBindingForce::setLinkerTypeReservoir(int type, double volume, 
     types[type].concentration = concentration;
 }
 
+void CylinderChainBindingForce::getLinkerTypeDiffusion(int type, double& diffusion, bool& planar) const {
+    diffusion = getLinkerType(type).diffusion;
+    planar = getLinkerType(type).planar;
+}
+
+void CylinderChainBindingForce::setLinkerTypeDiffusion(int type, double diffusion, bool planar) {
+    ASSERT_VALID_INDEX(type, types);
+    requireOfBinding(diffusion == -1 || (diffusion >= 0 && isfinite(diffusion)),
+            "A diffusion coefficient cannot be negative and must be finite");
+    requireOfBinding(diffusion == -1 || types[type].hands[0] >= 0, "Anchored linkers do not diffuse");
+    types[type].diffusion = diffusion;
+    types[type].planar = planar;
+}
+
+void CylinderChainBindingForce::addLinkerTypeWall(int type, const string& shape, const Vec3& point, const Vec3& vector,
+        double length) {
+    ASSERT_VALID_INDEX(type, types);
+    types[type].walls.push_back(CylinderChainWallForce(shape, point, vector, length, 0).getWalls().wall);
+}
+
+string CylinderChainBindingForce::getLinkerTypeWall(int type, int wall, Vec3& point, Vec3& vector,
+        double& length) const {
+    const std::vector<Wall>& walls = getLinkerType(type).walls;
+    ASSERT_VALID_INDEX(wall, walls);
+    const Wall& own = walls[wall];
+    point = Vec3(own.point[0], own.point[1], own.point[2]);
+    vector = Vec3(own.vector[0], own.vector[1], own.vector[2]);
+    length = own.length;
+    return Names<WallShape>::ALL[static_cast<int>(own.shape)];
+}
+
 int CylinderChainBindingForce::addParticleAnchor(int particle) {
     requireOfBinding(particle >= 0, "Illegal particle index: "+to_string(particle));
     Place place;
@@ -256,6 +288,7 @@ void CylinderChainBindingForce::setLinkers(const vector<int>& numbers, const vec
     checkLinkers(linkers, {hands, this->types, this->anchors, 0.0});
     state.linkers = linkers;
     state.clocks.clear();
+    state.positions.clear();
     state.nextNumber = nextNumber;
 }
 
@@ -326,8 +359,46 @@ void CylinderChainBindingForce::setLinkersInContext(Context& context, const vect
     LinkerState replaced = impl.getKnownState();
     replaced.linkers = columnsOf(numbers, types, anchors, chains, places, nextNumber).getLinkers();
     replaced.clocks.clear();
+    replaced.positions.clear();
     replaced.nextNumber = nextNumber;
     impl.setState(replaced);
+}
+
+static void giveUnbound(const LinkerState& state, vector<int>& numbers, vector<double>& places) {
+    const FreeColumns columns(state);
+    numbers = columns.numbers;
+    places = columns.places;
+}
+
+static FreeColumns unboundOf(const vector<int>& numbers, const vector<double>& places) {
+    FreeColumns columns;
+    columns.numbers = numbers;
+    columns.places = places;
+    return columns;
+}
+
+void CylinderChainBindingForce::getUnboundPositions(vector<int>& numbers, vector<double>& places) const {
+    giveUnbound(state, numbers, places);
+}
+
+void CylinderChainBindingForce::setUnboundPositions(const vector<int>& numbers, const vector<double>& places) {
+    LinkerState changed = state;
+    changed.positions.clear();
+    unboundOf(numbers, places).give(changed);
+    state.positions = changed.positions;
+}
+
+void CylinderChainBindingForce::getUnboundPositionsInContext(Context& context, vector<int>& numbers,
+        vector<double>& places) const {
+    giveUnbound(dynamic_cast<CylinderChainBindingForceImpl&>(getImplInContext(context)).getState(), numbers, places);
+}
+
+void CylinderChainBindingForce::setUnboundPositionsInContext(Context& context, const vector<int>& numbers,
+        const vector<double>& places) const {
+    CylinderChainBindingForceImpl& impl = dynamic_cast<CylinderChainBindingForceImpl&>(getImplInContext(context));
+    LinkerState changed = impl.getState();
+    unboundOf(numbers, places).give(changed);
+    impl.setState(changed);
 }
 
 void CylinderChainBindingForce::getNumEventsInContext(Context& context, int type, long long& bindings,

@@ -1,6 +1,7 @@
 #include "openmm/internal/CylinderChainBindingForceImpl.h"
 #include "couplings/Contours.h"
 #include "couplings/EndLinks.h"
+#include "kinetics/LinkerRegion.h"
 #include "openmm/CylinderChainException.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/CylinderChainIntegrator.h"
@@ -9,6 +10,7 @@
 #include "openmm/System.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/CylinderChainDescription.h"
+#include "openmm/internal/CylinderChainWallForceImpl.h"
 #include "openmm/internal/LinkDescription.h"
 #include "openmm/internal/LinkerDescription.h"
 #include "openmm/internal/OSRngSeed.h"
@@ -92,7 +94,7 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
     for (int i = 0; i < owner.getNumLinkerTypes(); i++) {
         system.types.push_back(owner.getLinkerType(i));
         const cylchain::LinkerType& type = system.types.back();
-        require(type.hands[0] < 0 || type.volume > 0 || type.concentration >= 0 ||
+        require(type.hands[0] < 0 || type.volume > 0 || type.concentration >= 0 || type.diffuses() ||
                 ofContext.usesPeriodicBoundaryConditions(), "Linkers of type "+to_string(i)+
                 " need a volume or a concentration, since there is no periodic box");
     }
@@ -113,6 +115,7 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
                     "two hands that come from no concentration");
     state = owner.getState();
     state.events.resize(system.types.size());
+    checkDiffusion();
     checkLinkers(state.linkers, system, contours.get());
     const CylinderChainIntegrator* integrator = findIntegrator();
     seed = (uint32_t) (integrator == NULL ? owner.getRandomNumberSeed() : integrator->getRandomNumberSeed());
@@ -121,7 +124,53 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
     linkerKernel = context.getPlatform().createKernel(UpdateCylinderChainLinkersKernel::Name(), context);
     linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().initialize(system, description.getList(),
             owner.usesPeriodicBoundaryConditions(), nearestParticles);
+    placeUnbound(state);
     upToDate = false;
+}
+
+void CylinderChainBindingForceImpl::checkDiffusion() const {
+    for (size_t i = 0; i < system.types.size(); i++) {
+        const cylchain::LinkerType& type = system.types[i];
+        require(!type.diffuses() || (type.volume == 0 && type.concentration < 0), "Linkers of type "+to_string(i)+
+                " diffuse: they have neither a volume, which is that of the walls or the box, nor a concentration");
+    }
+}
+
+vector<cylchain::Wall> CylinderChainBindingForceImpl::findWalls() const {
+    vector<cylchain::Wall> walls;
+    for (const ForceImpl* impl : context->getForceImpls()) {
+        const CylinderChainWallForceImpl* wall = dynamic_cast<const CylinderChainWallForceImpl*>(impl);
+        if (wall != NULL)
+            walls.push_back(wall->getWall());
+    }
+    return walls;
+}
+
+void CylinderChainBindingForceImpl::placeUnbound(cylchain::LinkerState& changed) {
+    if (!system.anyDiffuses()) {
+        changed.positions.clear();
+        return;
+    }
+    const vector<cylchain::Wall> walls = findWalls();
+    Vec3 box[3];
+    context->getPeriodicBoxVectors(box[0], box[1], box[2]);
+    const double* const periodicBox = owner.usesPeriodicBoundaryConditions() ? &box[0][0] : NULL;
+    for (const cylchain::LinkerType& type : system.types)
+        require(!type.diffuses() || cylchain::LinkerRegion(type.walls.empty() ? walls : type.walls,
+                periodicBox).isBounded(), "Linkers that diffuse need a region: add a CylinderChainWallForce that is "
+                "closed (a sphere, a box or an ellipsoid), or have a periodic box, with nothing but slabs and "
+                "cylinders in it");
+    for (size_t i = 0; 3*i < changed.positions.size(); i++) {
+        const cylchain::LinkerType& type = system.types[changed.linkers[i].type];
+        const double* position = &changed.positions[3*i];
+        require(std::isnan(position[0]) || cylchain::LinkerRegion(type.walls.empty() ? walls : type.walls,
+                periodicBox).encloses(position), "Linker "+to_string(changed.linkers[i].number)+
+                " is outside of the walls");
+    }
+    UpdateCylinderChainLinkersKernel& kernel = linkerKernel.getAs<UpdateCylinderChainLinkersKernel>();
+    kernel.setWalls(walls);
+    require(kernel.placeFree(*context, changed, seed, number),
+            "There is no room for linkers that diffuse within all walls");
 }
 
 void CylinderChainBindingForceImpl::checkReaches(ContextImpl& context) const {
@@ -186,6 +235,8 @@ void CylinderChainBindingForceImpl::updateContextState(ContextImpl& context, boo
     if (!(size > 0))
         return;
     checkReaches(context);
+    if (system.anyDiffuses())
+        linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().setWalls(findWalls());
     require(state.nextNumber <= LAST_NUMBER, "Two thousand million linkers have come out of their concentrations, and "
             "there are no more numbers for others. Give them new ones, from zero on: read them by "
             "getLinkersInContext(), and set them by setLinkersInContext()");
@@ -228,16 +279,19 @@ void CylinderChainBindingForceImpl::setState(const cylchain::LinkerState& replac
     require(replaced.clocks.size() <= replaced.linkers.size() && all_of(replaced.clocks.begin(),
             replaced.clocks.end(), [] (double clock) {return isfinite(clock);}), "A linker has an illegal clock");
     require(replaced.events.size() <= system.types.size(), "There are events of a type of linkers that does not exist");
-    state = replaced;
+    cylchain::LinkerState changed = replaced;
+    placeUnbound(changed);
+    state = changed;
     hasStepped = false;
     accept();
 }
 
-void CylinderChainBindingForceImpl::chainsHaveGrown(ContextImpl&, const cylchain::ChainList& chains,
+void CylinderChainBindingForceImpl::chainsHaveGrown(ContextImpl& context, const cylchain::ChainList& chains,
         const cylchain::GrowthChanges& changes) {
     contours.reset(new cylchain::Contours(chains));
     upToDate = false;
-    bool any = linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().setChains(chains, changes.cuts, state);
+    bool any = linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().setChains(context, chains,
+            changes.cuts, state, seed, number);
     any |= addBranches(changes);
     any |= removeBrokenBranches();
     if (any)

@@ -12,7 +12,7 @@ using namespace cylchain;
 using namespace std;
 
 CylinderChainWallForceImpl::CylinderChainWallForceImpl(const CylinderChainWallForce& owner) : PushForceImpl(owner),
-        owner(owner) {
+        owner(owner), walls(owner.getWalls()) {
 }
 
 WallSystem CylinderChainWallForceImpl::describe() const {

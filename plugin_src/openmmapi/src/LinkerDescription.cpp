@@ -2,6 +2,7 @@
 #include "openmm/OpenMMException.h"
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <string>
 #include <tuple>
@@ -59,6 +60,36 @@ vector<Linker> LinkerColumns::getLinkers() const {
     return linkers;
 }
 
+FreeColumns::FreeColumns(const LinkerState& state) {
+    for (size_t i = 0; 3*i < state.positions.size(); i++)
+        if (!isnan(state.positions[3*i])) {
+            numbers.push_back(state.linkers[i].number);
+            places.insert(places.end(), &state.positions[3*i], &state.positions[3*i]+3);
+        }
+}
+
+void FreeColumns::give(LinkerState& state) const {
+    checkLinkerColumn("coordinates of unbound linkers", places.size(), 3*numbers.size());
+    if (numbers.empty())
+        return;
+    state.positions.resize(3*state.linkers.size(), numeric_limits<double>::quiet_NaN());
+    size_t i = 0;
+    for (size_t k = 0; k < numbers.size(); k++) {
+        if (k > 0 && numbers[k] <= numbers[k-1])
+            refuseLinkers("The numbers of unbound linkers must ascend");
+        while (i < state.linkers.size() && static_cast<int>(state.linkers[i].number) < numbers[k])
+            i++;
+        if (i == state.linkers.size() || static_cast<int>(state.linkers[i].number) != numbers[k] ||
+                state.linkers[i].isHeld(0) || state.linkers[i].isHeld(1))
+            refuseLinkers("There is no unbound linker with the number "+to_string(numbers[k]));
+        for (int axis = 0; axis < 3; axis++) {
+            if (!isfinite(places[3*k+axis]))
+                refuseLinkers("The position of linker "+to_string(numbers[k])+" must be finite");
+            state.positions[3*i+axis] = places[3*k+axis];
+        }
+    }
+}
+
 StateColumns storeLinkers(const LinkerState& state) {
     const LinkerColumns linkers(state);
     vector<double> clocks;
@@ -78,6 +109,11 @@ StateColumns storeLinkers(const LinkerState& state) {
     columns.put("chains", linkers.chains);
     columns.put("places", linkers.places);
     columns.put("clocks", clocks);
+    const FreeColumns unbound(state);
+    if (!unbound.numbers.empty()) {
+        columns.put("unboundNumbers", unbound.numbers);
+        columns.put("unboundPlaces", unbound.places);
+    }
     return columns;
 }
 
@@ -98,6 +134,12 @@ LinkerState restoreLinkers(const StateColumns& columns) {
     checkLinkerColumn("events", events.size(), events.size()/2*2);
     for (size_t i = 0; i < events.size(); i += 2)
         state.events.push_back({events[i], events[i+1]});
+    if (columns.has("unboundNumbers")) {
+        FreeColumns unbound;
+        unbound.numbers = columns.get<int>("unboundNumbers");
+        unbound.places = columns.get<double>("unboundPlaces");
+        unbound.give(state);
+    }
     return state;
 }
 

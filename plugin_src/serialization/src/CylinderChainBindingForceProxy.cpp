@@ -34,10 +34,21 @@ static void write(const CylinderChainBindingForce& force, SerializationNode& nod
     SerializationNode& types = node.createChildNode("LinkerTypes");
     for (int i = 0; i < force.getNumLinkerTypes(); i++) {
         const cylchain::LinkerType& type = force.getLinkerType(i);
-        types.createChildNode("LinkerType").setIntProperty("hand1", type.hands[0])
+        SerializationNode& child = types.createChildNode("LinkerType");
+        for (int wall = 0; wall < force.getNumLinkerTypeWalls(i); wall++) {
+            Vec3 point, vector;
+            double length;
+            const string shape = force.getLinkerTypeWall(i, wall, point, vector, length);
+            child.createChildNode("Wall").setStringProperty("shape", shape).setDoubleProperty("x", point[0])
+                    .setDoubleProperty("y", point[1]).setDoubleProperty("z", point[2])
+                    .setDoubleProperty("vx", vector[0]).setDoubleProperty("vy", vector[1])
+                    .setDoubleProperty("vz", vector[2]).setDoubleProperty("length", length);
+        }
+        child.setIntProperty("hand1", type.hands[0])
                 .setIntProperty("hand2", type.hands[1]).setDoubleProperty("restLength", type.restLength)
                 .setDoubleProperty("stiffness", type.stiffness).setBoolProperty("sameChain", type.sameChain)
-                .setDoubleProperty("volume", type.volume).setDoubleProperty("concentration", type.concentration);
+                .setDoubleProperty("volume", type.volume).setDoubleProperty("concentration", type.concentration)
+                .setDoubleProperty("diffusion", type.diffusion).setBoolProperty("planar", type.planar);
     }
     SerializationNode& anchors = node.createChildNode("Anchors");
     for (int i = 0; i < force.getNumAnchors(); i++) {
@@ -87,6 +98,12 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
                 type.getBoolProperty("sameChain"));
         force->setLinkerTypeReservoir(number, type.getDoubleProperty("volume"),
                 type.getDoubleProperty("concentration"));
+        if (type.hasProperty("diffusion"))
+            force->setLinkerTypeDiffusion(number, type.getDoubleProperty("diffusion"), type.getBoolProperty("planar"));
+        for (auto& wall : type.getChildren())
+            force->addLinkerTypeWall(number, wall.getStringProperty("shape"), Vec3(wall.getDoubleProperty("x"),
+                    wall.getDoubleProperty("y"), wall.getDoubleProperty("z")), Vec3(wall.getDoubleProperty("vx"),
+                    wall.getDoubleProperty("vy"), wall.getDoubleProperty("vz")), wall.getDoubleProperty("length"));
     }
     for (auto& anchor : node.getChildNode("Anchors").getChildren()) {
         const int particle = anchor.getIntProperty("particle");
@@ -101,9 +118,12 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
         force->addBranchJoint(columns.getOne<int>("nucleator"), columns.get<int>("types"),
                 columns.get<double>("onMother"), columns.get<double>("onBranch"));
     }
-    const LinkerColumns linkers(restoreLinkers(StateColumns::read(node.getChildNode("Linkers"))));
+    const cylchain::LinkerState state = restoreLinkers(StateColumns::read(node.getChildNode("Linkers")));
+    const LinkerColumns linkers(state);
     force->setLinkers(linkers.numbers, linkers.types, linkers.anchors, linkers.chains, linkers.places,
             linkers.nextNumber);
+    const FreeColumns unbound(state);
+    force->setUnboundPositions(unbound.numbers, unbound.places);
     return force;
 }
 

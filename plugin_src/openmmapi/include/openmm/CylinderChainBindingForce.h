@@ -5,6 +5,7 @@
 #include "openmm/Context.h"
 #include "openmm/CylinderChainCoupling.h"
 #include "openmm/Vec3.h"
+#include <string>
 #include <vector>
 
 namespace OpenMM {
@@ -24,6 +25,11 @@ namespace OpenMM {
  *                                    filament within its reach;
  *     a hand that is bound           unbinds with the rate k exp(lambda U/kT), or k exp(|F|/Fu), to which a second
  *                                    pathway adds kc exp(-|F|/Fc).
+ *
+ * Linkers of a type that diffuses have positions while they are not bound: within the walls of each
+ * CylinderChainWallForce of the System, or those of the type, and in the periodic box.  They bind a hand with the rate
+ * c (R'/R)^(3/2) for each length of filament within its reach R, R' being that of the other hand, and unbind to
+ * anywhere in a sphere with the radius R: as often, in equilibrium, as those without positions.
  *
  * With the first law of unbinding and without speed, equilibrium is that of the energies, whatever the step is.
  * Lengths along a filament are those of its segments at rest, from its first node, the minus end, to its last, the plus
@@ -222,6 +228,50 @@ public:
      */
     void setLinkerTypeReservoir(int type, double volume, double concentration);
     /**
+     * Get how linkers of a type diffuse while they are not bound.
+     *
+     * @param type            the number of the type
+     * @param[out] diffusion  the diffusion coefficient, measured in nm^2/ps, or -1 if they have no positions
+     * @param[out] planar     whether they stay in the plane z = 0
+     */
+    void getLinkerTypeDiffusion(int type, double& diffusion, bool& planar) const;
+    /**
+     * Set how linkers of a type diffuse while they are not bound.  They have no positions unless this is called.
+     *
+     * @param type       the number of the type, the linkers of which have two hands, and no volume or concentration
+     * @param diffusion  the diffusion coefficient, measured in nm^2/ps, or -1 if they have no positions
+     * @param planar     whether they stay in the plane z = 0; the rate of binding has the factor R'/R then
+     */
+    void setLinkerTypeDiffusion(int type, double diffusion, bool planar);
+    /**
+     * Get the number of walls that linkers of a type are within which diffuse, see addLinkerTypeWall().
+     */
+    int getNumLinkerTypeWalls(int type) const {
+        return getLinkerType(type).walls.size();
+    }
+    /**
+     * Let linkers of a type that diffuse be within a region of their own, in place of the walls of the System; if there
+     * are several, within all of them.
+     *
+     * @param type    the number of the type
+     * @param shape   the name of the shape, see CylinderChainWallForce
+     * @param point   see CylinderChainWallForce, measured in nm
+     * @param vector  see CylinderChainWallForce
+     * @param length  see CylinderChainWallForce, measured in nm
+     */
+    void addLinkerTypeWall(int type, const std::string& shape, const Vec3& point, const Vec3& vector, double length);
+    /**
+     * Get a wall of a type of linkers.
+     *
+     * @param type         the number of the type
+     * @param wall         the number of the wall
+     * @param[out] point   see CylinderChainWallForce, measured in nm
+     * @param[out] vector  see CylinderChainWallForce
+     * @param[out] length  see CylinderChainWallForce, measured in nm
+     * @return the name of the shape
+     */
+    std::string getLinkerTypeWall(int type, int wall, Vec3& point, Vec3& vector, double& length) const;
+    /**
      * Get the number of anchors.
      */
     int getNumAnchors() const {
@@ -303,6 +353,30 @@ public:
     void setLinkersInContext(Context& context, const std::vector<int>& numbers, const std::vector<int>& types,
             const std::vector<int>& anchors, const std::vector<int>& chains, const std::vector<double>& places,
             int nextNumber) const;
+    /**
+     * Get where those linkers are that diffuse and are not bound, and have been given positions.
+     *
+     * @param[out] numbers  their numbers, in ascending order
+     * @param[out] places   three coordinates of each, measured in nm
+     */
+    void getUnboundPositions(std::vector<int>& numbers, std::vector<double>& places) const;
+    /**
+     * Set where linkers are that diffuse and are not bound.  All others are anywhere in their region, at random.
+     *
+     * @param numbers  their numbers, in ascending order
+     * @param places   three coordinates of each, measured in nm
+     */
+    void setUnboundPositions(const std::vector<int>& numbers, const std::vector<double>& places);
+    /**
+     * Get where those linkers of a Context are that diffuse and are not bound, like getUnboundPositions().  In a
+     * periodic box, they are not taken back into it.
+     */
+    void getUnboundPositionsInContext(Context& context, std::vector<int>& numbers, std::vector<double>& places) const;
+    /**
+     * Set where linkers of a Context are that diffuse and are not bound; all others stay where they are.
+     */
+    void setUnboundPositionsInContext(Context& context, const std::vector<int>& numbers,
+            const std::vector<double>& places) const;
     /**
      * Get how often hands of linkers of a type have bound and unbound in a Context.
      *

@@ -262,12 +262,22 @@ public:
             bool nearestParticles) = 0;
     /**
      * Take note that chains have grown or shrunk, where this platform has such: see
-     * cylchain::LinkerKinetics::setChains().
+     * cylchain::LinkerKinetics::setChains(). Random numbers are those of execute().
      */
-    virtual bool setChains(const cylchain::ChainList&, const std::vector<cylchain::ChainCut>&,
-            cylchain::LinkerState&) {
+    virtual bool setChains(ContextImpl&, const cylchain::ChainList&, const std::vector<cylchain::ChainCut>&,
+            cylchain::LinkerState&, std::uint32_t, int) {
         return false;
     }
+    /**
+     * Set within which walls linkers are that diffuse.
+     */
+    virtual void setWalls(const std::vector<cylchain::Wall>& walls) = 0;
+    /**
+     * Give positions to linkers that diffuse and have none.
+     *
+     * @return false if there is no room within the walls
+     */
+    virtual bool placeFree(ContextImpl& context, cylchain::LinkerState& state, std::uint32_t seed, int force) = 0;
     /**
      * Take a step of the linkers, in which particles do not move.
      *

@@ -20,6 +20,10 @@ public:
     long long execute(ContextImpl& context, cylchain::LinkerState& state, double kT, double stepSize,
             std::uint32_t seed, int force, std::vector<cylchain::Link>& links);
     void describe(const cylchain::LinkerState& state, std::vector<cylchain::Link>& links);
+    void setWalls(const std::vector<cylchain::Wall>& walls) {
+        kinetics->setWalls(walls);
+    }
+    bool placeFree(ContextImpl& context, cylchain::LinkerState& state, std::uint32_t seed, int force);
 private:
     void refuseImplicitSteps(ContextImpl& context);
     ComputeContext& cc;

@@ -60,6 +60,15 @@ long long CommonUpdateCylinderChainLinkersKernel::execute(ContextImpl& context, 
     }, &links);
 }
 
+bool CommonUpdateCylinderChainLinkersKernel::placeFree(ContextImpl& context, LinkerState& state, uint32_t seed,
+        int force) {
+    Vec3 box[3];
+    context.getPeriodicBoxVectors(box[0], box[1], box[2]);
+    KineticStep step = {NULL, LinkBoxes(), 0, 0, seed, static_cast<uint32_t>(force)};
+    step.boxes.distances = periodic ? &box[0][0] : NULL;
+    return kinetics->placeFree(state, step);
+}
+
 void CommonUpdateCylinderChainLinkersKernel::describe(const LinkerState& state, vector<Link>& links) {
     kinetics->describe(state, links);
 }

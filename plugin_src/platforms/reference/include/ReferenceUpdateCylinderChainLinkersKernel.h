@@ -16,14 +16,21 @@ public:
     ReferenceUpdateCylinderChainLinkersKernel(std::string name, const Platform& platform, ContextImpl& context);
     void initialize(const cylchain::LinkerSystem& system, const cylchain::ChainList& chains, bool periodic,
             bool nearestParticles);
-    bool setChains(const cylchain::ChainList& chains, const std::vector<cylchain::ChainCut>& cuts,
-            cylchain::LinkerState& state) {
-        return kinetics->setChains(chains, cuts, state);
+    bool setChains(ContextImpl& context, const cylchain::ChainList& chains,
+            const std::vector<cylchain::ChainCut>& cuts, cylchain::LinkerState& state, std::uint32_t seed, int force) {
+        return kinetics->setChains(chains, cuts, state, describeStep(context, 0, seed, force));
+    }
+    void setWalls(const std::vector<cylchain::Wall>& walls) {
+        kinetics->setWalls(walls);
+    }
+    bool placeFree(ContextImpl& context, cylchain::LinkerState& state, std::uint32_t seed, int force) {
+        return kinetics->placeFree(state, describeStep(context, 0, seed, force));
     }
     long long execute(ContextImpl& context, cylchain::LinkerState& state, double kT, double stepSize,
             std::uint32_t seed, int force, std::vector<cylchain::Link>& links);
     void describe(const cylchain::LinkerState& state, std::vector<cylchain::Link>& links);
 private:
+    cylchain::KineticStep describeStep(ContextImpl& context, double stepSize, std::uint32_t seed, int force) const;
     ReferenceParallelLoop loop;
     std::unique_ptr<cylchain::LinkerKinetics> kinetics;
     bool periodic, nearestParticles;

@@ -17,15 +17,21 @@ void ReferenceUpdateCylinderChainLinkersKernel::initialize(const LinkerSystem& s
     this->nearestParticles = nearestParticles;
 }
 
-long long ReferenceUpdateCylinderChainLinkersKernel::execute(ContextImpl& context, LinkerState& state,
-        double kT, double stepSize, uint32_t seed, int force, vector<Link>& links) {
+KineticStep ReferenceUpdateCylinderChainLinkersKernel::describeStep(ContextImpl& context, double stepSize,
+        uint32_t seed, int force) const {
     ReferencePlatform::PlatformData& data = extractData(context);
     Vec3* const box = data.periodicBoxVectors;
     KineticStep step = {&(*data.positions)[0][0], LinkBoxes(), box[0][0]*box[1][1]*box[2][2], stepSize, seed,
             static_cast<uint32_t>(force)};
     step.boxes.distances = periodic ? &box[0][0] : NULL;
     step.boxes.segments = nearestParticles ? &box[0][0] : NULL;
+    return step;
+}
+
+long long ReferenceUpdateCylinderChainLinkersKernel::execute(ContextImpl& context, LinkerState& state,
+        double kT, double stepSize, uint32_t seed, int force, vector<Link>& links) {
     kinetics->setTemperature(kT);
+    const KineticStep step = describeStep(context, stepSize, seed, force);
     return kinetics->advance(state, step, [&] (int count, const function<void(int)>& iteration) {
         loop.run(count, iteration);
     }, &links);

@@ -73,6 +73,15 @@ private:
     template <class Function> void forBoundHands(Function function);
     bool addBranches(const cylchain::GrowthChanges& changes);
     bool removeBrokenBranches();
+    void checkDiffusion() const;
+    /**
+     * Get the walls of the System, as they are in the Context now.
+     */
+    std::vector<cylchain::Wall> findWalls() const;
+    /**
+     * Find positions for linkers that diffuse, and check those that they have.
+     */
+    void placeUnbound(cylchain::LinkerState& changed);
     void follow() const;
     void accept();
     /**

@@ -35,6 +35,12 @@ public:
     bool hasForces() {
         return !walls.particles.empty() && walls.stiffness != 0;
     }
+    /**
+     * Get the wall, as it is in the Context now.
+     */
+    const cylchain::Wall& getWall() const {
+        return walls.wall;
+    }
     cylchain::ImplicitCouplings* getEquations(ContextImpl& context);
     void setSpareNodes(ContextImpl& context, const std::vector<bool>& isSpare);
     std::unique_ptr<cylchain::Surroundings> describeSurroundings(const cylchain::ChainList& chains,

@@ -25,6 +25,20 @@ struct LinkerColumns {
 };
 
 /**
+ * Linkers that diffuse and are not bound: their numbers, and three coordinates of each.
+ */
+struct FreeColumns {
+    std::vector<int> numbers;
+    std::vector<double> places;
+    FreeColumns() = default;
+    explicit FreeColumns(const cylchain::LinkerState& state);
+    /**
+     * Give linkers their positions, which must be finite; an exception is thrown if there is none of a number.
+     */
+    void give(cylchain::LinkerState& state) const;
+};
+
+/**
  * Store linkers.
  */
 StateColumns storeLinkers(const cylchain::LinkerState& state);
