@@ -13,10 +13,16 @@ def divided(text, parts=2):
     return text.replace(line, "").rstrip() + "\n" + "".join(stages)
 
 
+DIFFUSING = """[[linkers]]
+diffusion = "1 um^2/s"
+inside = { shape = "box", lower = ["-1 um", "-1 um", "-1 um"], upper = ["2 um", "2 um", "2 um"] }"""
+"""Linkers that diffuse by themselves."""
+
 MANY_CHANGES = (
     NETWORK.replace('duration = "1 ms"\n', "checks = false\n")
     .replace('report_interval = "0.1 ms"', 'report_interval = "50 us"')
-    .replace("bound =", 'volume = "0.08 um^3"\nbound =')
+    .replace("[[linkers]]", DIFFUSING, 1)
+    .replace("bound = 40", 'volume = "0.08 um^3"\nbound = 40')
     + """
 checkpoint_interval = "50 us"
 [[link]]
