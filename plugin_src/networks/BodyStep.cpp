@@ -1,11 +1,13 @@
 #include "networks/BodyStep.h"
 #include "lanes/Noise.h"
 #include "mechanics/SymmetricMatrices.h"
+#include "networks/BodyEquations.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 
 using namespace cylchain;
+using namespace cylchain::BodyEquations;
 using namespace std;
 
 namespace {
@@ -16,34 +18,9 @@ const double LEAST_WORK = 1e-5;
 const double COLD = 1e-3;
 /** The largest turn of an iteration, and that of a step in which something holds a body off its centre, in rad. */
 const double LARGEST_TURN_OF_ITERATION = 1, LARGEST_TURN = 6;
-/** Of a planar body: it neither moves across its plane nor turns about directions in it. */
-const int ACROSS_PLANE[] = {2, 3, 4};
 const double UNITY[] = {1, 0, 0, 1, 0, 1};
 /** Of forces on places: what less of them does to a body is lost. */
 const double LEAST_SHARE = 1e-12;
-
-void cross(const double* a, const double* b, double* result) {
-    result[0] = a[1]*b[2]-a[2]*b[1];
-    result[1] = a[2]*b[0]-a[0]*b[2];
-    result[2] = a[0]*b[1]-a[1]*b[0];
-}
-
-/** Find how a place moves with a motion of the centre and a turn. */
-void findMove(const double* change, const double* arm, double* move) {
-    cross(change+3, arm, move);
-    for (int k = 0; k < 3; k++)
-        move[k] += change[k];
-}
-
-/** Add the force on a place to that on the centre and to the torque. */
-void addForce(const double* force, const double* arm, double* sums) {
-    double torque[3];
-    cross(arm, force, torque);
-    for (int k = 0; k < 3; k++) {
-        sums[k] += force[k];
-        sums[3+k] += torque[k];
-    }
-}
 
 /** Add the products of a force with its place in the frame of the body, row by row. */
 void addProducts(const double* force, const double* place, double* products) {
@@ -69,101 +46,6 @@ double traceOfProducts(const double* products, const RigidFrame& frame) {
         for (int k = 0; k < 3; k++)
             sum += products[3*row+k]*frame.rotation[3*row+k];
     return sum;
-}
-
-/** Add a symmetric matrix to one of the blocks on the diagonal. */
-void addBlock(const double* block, double factor, int first, double* matrix) {
-    int entry = 0;
-    for (int row = 0; row < 3; row++)
-        for (int column = row; column < 3; column++, entry++) {
-            matrix[6*(first+row)+first+column] += factor*block[entry];
-            if (column > row)
-                matrix[6*(first+column)+first+row] += factor*block[entry];
-        }
-}
-
-/** What couplings at one place do to six unknowns: how far the place moves by each of them. */
-struct PlaceMoves {
-    double moves[6][3];
-    explicit PlaceMoves(const double* arm) {
-        for (int i = 0; i < 6; i++) {
-            double unit[6] = {};
-            unit[i] = 1;
-            findMove(unit, arm, moves[i]);
-        }
-    }
-    void addStiffness(const double* stiffness, double* matrix) const {
-        for (int i = 0; i < 6; i++) {
-            double force[3];
-            multiply(stiffness, moves[i], force);
-            for (int j = 0; j < 6; j++)
-                matrix[6*j+i] += dot(moves[j], force);
-        }
-    }
-    void findCompliance(const double* inverse, double* compliance) const {
-        double half[6][3] = {};
-        for (int i = 0; i < 6; i++)
-            for (int j = 0; j < 6; j++)
-                for (int k = 0; k < 3; k++)
-                    half[i][k] += inverse[6*i+j]*moves[j][k];
-        int entry = 0;
-        for (int row = 0; row < 3; row++)
-            for (int column = row; column < 3; column++) {
-                double sum = 0;
-                for (int i = 0; i < 6; i++)
-                    sum += moves[i][row]*half[i][column];
-                compliance[entry++] = sum;
-            }
-    }
-};
-
-/** The inverse of a symmetric, positive definite matrix. */
-void invert(const double* matrix, double* inverse) {
-    const int n = 6;
-    double rest[n*n];
-    copy_n(matrix, n*n, rest);
-    fill_n(inverse, n*n, 0.0);
-    for (int i = 0; i < n; i++)
-        inverse[n*i+i] = 1;
-    for (int pivot = 0; pivot < n; pivot++) {
-        const double scale = 1/rest[n*pivot+pivot];
-        for (int k = 0; k < n; k++) {
-            rest[n*pivot+k] *= scale;
-            inverse[n*pivot+k] *= scale;
-        }
-        for (int row = 0; row < n; row++) {
-            const double factor = rest[n*row+pivot];
-            for (int k = 0; k < n && row != pivot; k++) {
-                rest[n*row+k] -= factor*rest[n*pivot+k];
-                inverse[n*row+k] -= factor*inverse[n*pivot+k];
-            }
-        }
-    }
-}
-
-/** Invert the equations of a body, of which some unknowns may be none. */
-void invert(const double* matrix, bool planar, bool turns, double* inverse) {
-    bool fixed[6] = {};
-    for (int i : ACROSS_PLANE)
-        fixed[i] = planar;
-    for (int i = 3; i < 6; i++)
-        fixed[i] |= !turns;
-    double reduced[36];
-    for (int i = 0; i < 6; i++)
-        for (int j = 0; j < 6; j++)
-            reduced[6*i+j] = !fixed[i] && !fixed[j] ? matrix[6*i+j] : i == j;
-    invert(reduced, inverse);
-    for (int i = 0; i < 6; i++)
-        if (fixed[i])
-            inverse[7*i] = 0;
-}
-
-void multiplySix(const double* matrix, const double* vector, double* result) {
-    for (int i = 0; i < 6; i++) {
-        result[i] = 0;
-        for (int j = 0; j < 6; j++)
-            result[i] += matrix[6*i+j]*vector[j];
-    }
 }
 
 /** The square root of a symmetric, positive definite matrix that is a triangle: times a vector. */
@@ -306,7 +188,7 @@ void BodyStep::eliminate(const CouplingTerm* newTerms, int count, double* moves)
         addBlock(resistance, 1, 3, body.matrix);
     }
     for (int i = 0; i < numTerms; i++) {
-        PlaceMoves(&arms[3*i]).addStiffness(terms[i].stiffness, states[terms[i].lane].matrix);
+        addStiffness(terms[i].stiffness, &arms[3*i], states[terms[i].lane].matrix);
         addForce(terms[i].force, &arms[3*i], &right[6*terms[i].lane]);
     }
     for (int i : going) {
@@ -373,7 +255,7 @@ void BodyStep::findProjections() {
     for (int i : going)
         fill_n(states[i].projection, 36, 0.0);
     for (int i = 0; i < numTerms; i++)
-        PlaceMoves(&arms[3*i]).addStiffness(UNITY, states[terms[i].lane].projection);
+        addStiffness(UNITY, &arms[3*i], states[terms[i].lane].projection);
     for (int i : going) {
         double* const own = states[i].projection;
         double regular[36];
@@ -411,7 +293,7 @@ void BodyStep::findMetricTorques() {
     if (joints.empty())
         return;
     vector<double> matrices(36*bodies.size());
-    vector<PlaceMoves> places;
+    vector<double> halfway(3*joints.size());
     for (int i : going) {
         const double perStep = bodies[i].friction/settings.stepSize;
         const double isotropic[] = {perStep, 0, 0, perStep, 0, perStep};
@@ -419,16 +301,15 @@ void BodyStep::findMetricTorques() {
         addBlock(isotropic, 1, 0, &matrices[36*i]);
         addBlock(states[i].rotationalFriction, 1/settings.stepSize, 3, &matrices[36*i]);
     }
-    for (const CouplingTerm& joint : joints) {
-        const State& body = states[joint.lane];
+    for (size_t i = 0; i < joints.size(); i++) {
+        const CouplingTerm& joint = joints[i];
         const double* const place = &bodies[joint.lane].places[3*joint.node];
-        double before[3], arm[3];
-        body.start.turn(place, before);
-        body.now.turn(place, arm);
+        double before[3], now[3];
+        states[joint.lane].start.turn(place, before);
+        states[joint.lane].now.turn(place, now);
         for (int k = 0; k < 3; k++)
-            arm[k] = 0.5*(before[k]+arm[k]);
-        places.emplace_back(arm);
-        places.back().addStiffness(joint.stiffness, &matrices[36*joint.lane]);
+            halfway[3*i+k] = 0.5*(before[k]+now[k]);
+        addStiffness(joint.stiffness, &halfway[3*i], &matrices[36*joint.lane]);
     }
     for (int i : going) {
         double inverse[36];
@@ -438,7 +319,7 @@ void BodyStep::findMetricTorques() {
     for (size_t i = 0; i < joints.size(); i++) {
         const double* const k = joints[i].stiffness;
         double c[6];
-        places[i].findCompliance(&matrices[36*joints[i].lane], c);
+        findCompliance(&matrices[36*joints[i].lane], &halfway[3*i], c);
         const double a[] = {k[1]*c[2]+k[3]*c[4]+k[4]*c[5]-c[1]*k[2]-c[3]*k[4]-c[4]*k[5],
                 k[2]*c[0]+k[4]*c[1]+k[5]*c[2]-c[2]*k[0]-c[4]*k[1]-c[5]*k[2],
                 k[0]*c[1]+k[1]*c[3]+k[2]*c[4]-c[0]*k[1]-c[1]*k[3]-c[2]*k[4]};
@@ -491,7 +372,7 @@ void BodyStep::respond(const float* onPlaces, float* moves) {
 
 void BodyStep::findCompliances(double* compliances) {
     for (int i = 0; i < numTerms; i++)
-        PlaceMoves(&arms[3*i]).findCompliance(states[terms[i].lane].inverse, compliances+6*i);
+        findCompliance(states[terms[i].lane].inverse, &arms[3*i], compliances+6*i);
 }
 
 void BodyStep::advance(const double* onPlaces, const ShareOfChange& share, bool* unfinished, double* moves) {

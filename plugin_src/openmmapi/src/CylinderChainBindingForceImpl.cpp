@@ -281,7 +281,7 @@ void CylinderChainBindingForceImpl::setState(const cylchain::LinkerState& replac
     require(replaced.events.size() <= system.types.size(), "There are events of a type of linkers that does not exist");
     cylchain::LinkerState changed = replaced;
     placeUnbound(changed);
-    state = changed;
+    state = move(changed);
     hasStepped = false;
     accept();
 }
