@@ -11,6 +11,7 @@ from openmm import unit
 from openmm_cylchain import (
     F_ACTIN,
     Box,
+    Capsule,
     Cylinder,
     Ellipsoid,
     Filaments,
@@ -36,6 +37,7 @@ SMALLER = [
     (Slab([1, 2, 3], [0, 1, 1], 3), Slab([1, 2, 3], [0, 1, 1], 2.2)),
     (Sphere([0, 1, 0], 2), Sphere([0, 1, 0], 1.6)),
     (Cylinder([0, 1, 0], [1, 1, 0], 2), Cylinder([0, 1, 0], [1, 1, 0], 1.6)),
+    (Capsule([0, 1, 0], [1, 1, 0], 3, 1), Capsule([0, 1, 0], [1, 1, 0], 3, 0.6)),
     (Box([-1, -2, -1], [1, 2, 3]), Box([-0.6, -1.6, -0.6], [0.6, 1.6, 2.6])),
     (Ellipsoid([0, 1, 0], [2, 2, 2]), Ellipsoid([0, 1, 0], [1.6, 1.6, 1.6])),
 ]
@@ -186,6 +188,8 @@ def test_bad_input_is_refused():
         (lambda: force.setRegion("sphere", openmm.Vec3(0, np.nan, 0), up, 1), "finite"),
         (lambda: force.setRegion("box", up, origin, 0), "must exceed"),
         (lambda: force.setRegion("ellipsoid", origin, up, 0), "must be positive"),
+        (lambda: force.setRegion("capsule", origin, origin, 1), "cannot be the zero vector"),
+        (lambda: force.setRegion("capsule", origin, up, 0), "must be positive"),
         (lambda: force.setStiffness(-1), "cannot be negative"),
         (lambda: force.addParticle(-1), "Illegal particle index"),
         (lambda: force.addParticle(0, -1), "cannot be negative"),

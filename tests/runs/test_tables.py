@@ -14,6 +14,7 @@ from openmm import unit
 from openmm_cylchain import (
     F_ACTIN,
     Box,
+    Capsule,
     Crosslinks,
     Cylinder,
     Ellipsoid,
@@ -89,6 +90,7 @@ def assert_same_system(one, system):
         ('shape = "sphere"\ncenter = ["0 nm", "5 nm", "0 nm"]\nradius = "2 um"', Sphere([0, 5, 0], 2000)),
         ('shape = "cylinder"\naxis = [0, 0, 2]\nradius = "2 um"', Cylinder([0, 0, 0], [0, 0, 2], 2000)),
         ('shape = "box"\nlower = ["-1 um", "-1 um", "-1 um"]\nupper = ["1 um", "1 um", "2 um"]', None),
+        ('shape = "capsule"\nlength = "4 um"\nradius = "2 um"', Capsule([0, 0, 0], [1, 0, 0], 4000, 2000)),
         ('shape = "ellipsoid"\nsemi_axes = ["1 um", "2 um", "3 um"]', Ellipsoid([0, 0, 0], [1000, 2000, 3000])),
     ],
 )
@@ -214,6 +216,9 @@ def test_places_in_a_region():
         'shape = "cylinder", axis = [0, 0, 1], radius = "250 nm", length = "1.5 um"': lambda x: (
             (np.hypot(x[:, 0], x[:, 1]) <= 250) & (abs(x[:, 2]) <= 750)
         ),
+        'shape = "capsule", axis = [1, 1, 0], radius = "250 nm", length = "1 um"': lambda x: (
+            Capsule([0, 0, 0], [1, 1, 0], 1000, 250).square_depth(x) == 0
+        ),
         'shape = "box", lower = ["0 um", "0 um", "0 um"], upper = ["1 um", "1 um", "1 um"]': lambda x: (
             (x >= 0) & (x <= 1000)
         ).all(axis=1),
@@ -250,6 +255,7 @@ VOLUMES = {
     'shape = "sphere"\nradius = "500 nm"': (4 / 3 * np.pi * 0.5**3, 4 / 3 * np.pi * 0.5**3),
     'shape = "ellipsoid"\nsemi_axes = ["500 nm", "400 nm", "300 nm"]': (0.08 * np.pi, 0.08 * np.pi),
     'shape = "box"\nlower = ["0 um", "0 um", "0 um"]\nupper = ["1 um", "2 um", "1 um"]': (2.0, 2.0),
+    'shape = "capsule"\nradius = "300 nm"\nlength = "1 um"': (0.126 * np.pi, 0.126 * np.pi),
     'shape = "slit"\nthickness = "200 nm"\nnormal = [0, -2, 0]': (None, 0.8),
     'shape = "cylinder"\nradius = "200 nm"\naxis = [0, 0, 1]': (None, np.pi * 0.08),
     # Larger than the box, askew, or of one side.

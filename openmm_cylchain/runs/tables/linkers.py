@@ -242,8 +242,8 @@ def _volume(entries, shapes, box):
     volume = volume_within(shapes, box)
     if volume is None:
         reason = (
-            f"which what there is of [[wall]] and [box] does not say: add a [[wall]] that is closed (a sphere, an "
-            f"ellipsoid or a box{'' if box is None else ' that is no larger than the periodic one'}), or"
+            f"which what there is of [[wall]] and [box] does not say: add a [[wall]] that is closed (a sphere, a "
+            f"capsule, an ellipsoid or a box{'' if box is None else ' that is no larger than the periodic one'}), or"
             if shapes
             else f"which nothing says: add a periodic [box] with edges = {EDGES.example}, or"
         )
