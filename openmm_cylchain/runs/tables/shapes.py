@@ -2,7 +2,18 @@
 
 import numpy as np
 
-from ...couplings.shapes import Box, Capsule, ClosedShape, Cylinder, Ellipsoid, Plane, Slab, Sphere, bounds_of, volume_of
+from ...couplings.shapes import (
+    Box,
+    Capsule,
+    ClosedShape,
+    Cylinder,
+    Ellipsoid,
+    Plane,
+    Slab,
+    Sphere,
+    bounds_of,
+    volume_of,
+)
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Key, Quantity, direction, point
 from ..table import TableKind
@@ -61,7 +72,9 @@ def read_shape(entries, others=()):
     """The Shape of a table with SHAPE_KEYS; those that its shape does not have are refused, but for others."""
     kind, names = _SHAPES[entries["shape"]]
     every = {key.name for key in _KEYS}
-    entries.refuse(sorted(every - set(names) - set(others)), f"is none of a {entries['shape']}: that has {', '.join(names)}.")
+    entries.refuse(
+        sorted(every - set(names) - set(others)), f"is none of a {entries['shape']}: that has {', '.join(names)}."
+    )
     entries.require(*(name for name in names if entries[name] is None))
     with entries.naming():
         return kind(*(np.array(entries[name]) if isinstance(entries[name], tuple) else entries[name] for name in names))
