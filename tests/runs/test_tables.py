@@ -502,7 +502,7 @@ def test_walls_hold_types_of_filaments():
     assert held == [everything, actin, tubes] and len(everything - actin - tubes) == 2
     assert sum(filament.growth is not None for filament in own.filaments) == 2
     assert_refused("names DNA, but filaments of the configuration are ACT", WALL + 'holds = "DSDNA"\n')
-    assert_refused("does not say", WALL + 'holds = "F_ACTIN"\n', LINKERS)
+    assert_refused("which nothing says", WALL + 'holds = "F_ACTIN"\n', LINKERS)
     volume = parse(WALL, WALL.replace("2 um", "1 um") + 'holds = "F_ACTIN"\n', LINKERS).linkers[0].volume
     assert volume == pytest.approx(4e9 / 3 * np.pi * 8)
     simulation = TAIL.replace("1 us", "10 ns", 1) + 'engine = "portable"\n'
