@@ -14,7 +14,7 @@ import numpy.typing as npt
 from ..couplings.beam_curves import BeamCurves
 from ..couplings.contact_frames import ContactFrame, DescribedContactFinder, joined_contacts
 from ..couplings.crosslink_records import CROSSLINK_RECORD, CrosslinkFrame, crosslinks_at
-from ..couplings.shapes import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
+from ..couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
 from ..errors import InputError, PrecisionWarning
 from ..filaments.grown import GrownChain
 from ..output.dcd_frames import DCDFrames
@@ -35,6 +35,7 @@ _SHAPES = {
     "slab": Slab,
     "sphere": lambda point, vector, length: Sphere(point, length),
     "cylinder": Cylinder,
+    "capsule": lambda point, vector, length: Capsule(point, vector, 2.0 * float(np.linalg.norm(vector)), length),
     "box": lambda point, vector, length: Box(point, vector),
     "ellipsoid": lambda point, vector, length: Ellipsoid(point, vector),
 }

@@ -1,4 +1,4 @@
-"""Shapes that walls have: planes, slabs, spheres, cylinders, boxes and ellipsoids."""
+"""Shapes that walls have: planes, slabs, spheres, cylinders, capsules, boxes and ellipsoids."""
 
 from __future__ import annotations
 
@@ -105,6 +105,13 @@ def number(value: float) -> str:
 def _along(point, direction):
     terms = (f"{number(n)}*({name}-{number(p)})" for name, n, p in zip("xyz", direction, point))
     return f"({'+'.join(terms)})"
+
+
+def _across(axis):
+    # Two directions orthogonal to an axis and to each other.
+    first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    first /= np.linalg.norm(first)
+    return first, np.cross(axis, first)
 
 
 def _beyond(expression):
@@ -261,15 +268,9 @@ class Cylinder(Face):
         _set(self, "axis", unit_vector(self.axis, "Cylinder"))
         _set(self, "radius", positive(self.radius, LENGTH, "Cylinder: radius"))
 
-    def _across(self):
-        # Two directions orthogonal to the axis and to each other.
-        first = np.cross(self.axis, np.eye(3)[np.argmin(np.abs(self.axis))])
-        first /= np.linalg.norm(first)
-        return first, np.cross(self.axis, first)
-
     @property
     def expression(self) -> str:
-        first, second = (_along(self.point, direction) for direction in self._across())
+        first, second = (_along(self.point, direction) for direction in _across(self.axis))
         return _beyond(f"sqrt({first}^2+{second}^2+{_TINY})-{number(self.radius)}")
 
     @property
@@ -283,6 +284,56 @@ class Cylinder(Face):
     def _depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         relative = positions - self.point
         return _radial(relative - (relative @ self.axis)[..., None] * self.axis, self.radius)
+
+
+@dataclass(frozen=True)
+class Capsule(Face):
+    """The inside of a capsule: a cylinder with a half sphere on each end.
+
+    Parameters
+    ----------
+    center : (3,) length
+        Its middle.
+    axis : (3,) array
+    length : length
+        Of the cylinder, from the center of one half sphere to that of the other.
+    radius : length
+    """
+
+    center: FloatArray
+    axis: FloatArray
+    length: float
+    radius: float
+
+    if TYPE_CHECKING:
+
+        def __init__(self, center: Vector, axis: Vector, length: Scalar, radius: Scalar) -> None: ...
+
+    def __post_init__(self) -> None:
+        _set(self, "center", vector(self.center, LENGTH, "Capsule: center"))
+        _set(self, "axis", unit_vector(self.axis, "Capsule"))
+        _set(self, "length", positive(self.length, LENGTH, "Capsule: length"))
+        _set(self, "radius", positive(self.radius, LENGTH, "Capsule: radius"))
+
+    @property
+    def expression(self) -> str:
+        directions = (*_across(self.axis), self.axis)
+        first, second, along = (_along(self.center, direction) for direction in directions)
+        beyond = f"max(0, abs({along})-{number(0.5 * self.length)})"
+        return _beyond(f"sqrt({first}^2+{second}^2+{beyond}^2+{_TINY})-{number(self.radius)}")
+
+    @property
+    def region(self) -> Region:
+        return ("capsule", self.center, 0.5 * self.length * self.axis, self.radius)
+
+    @property
+    def room(self) -> float:
+        return self.radius
+
+    def _depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        relative = positions - self.center
+        along = np.clip(relative @ self.axis, -0.5 * self.length, 0.5 * self.length)
+        return _radial(relative - along[..., None] * self.axis, self.radius)
 
 
 @dataclass(frozen=True)
@@ -391,19 +442,26 @@ class Ellipsoid(Face):
         return depths, rise[..., None] * of_square - (0.5 * depths / steepness)[..., None] * of_steepness
 
 
+ClosedShape = Box | Sphere | Ellipsoid | Capsule
+
+
 def _set(instance, name, value):
     object.__setattr__(instance, name, value)
 
 
-def bounds_of(shape: Box | Sphere | Ellipsoid) -> tuple[FloatArray, FloatArray]:
+def bounds_of(shape: ClosedShape) -> tuple[FloatArray, FloatArray]:
     """Two opposite corners (3,) in nm of the box around a shape that is closed."""
     if isinstance(shape, Box):
         return shape.lower, shape.upper
     reach = shape.semi_axes if isinstance(shape, Ellipsoid) else np.full(3, shape.radius)
+    if isinstance(shape, Capsule):
+        reach = reach + 0.5 * shape.length * np.abs(shape.axis)
     return shape.center - reach, shape.center + reach
 
 
-def volume_of(shape: Box | Sphere | Ellipsoid) -> float:
+def volume_of(shape: ClosedShape) -> float:
     """The volume in nm^3 of a shape that is closed."""
+    if isinstance(shape, Capsule):
+        return math.pi * shape.radius**2 * (shape.length + 4.0 / 3.0 * shape.radius)
     lower, upper = bounds_of(shape)
     return float(np.prod(upper - lower)) * (1.0 if isinstance(shape, Box) else np.pi / 6.0)

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..units.quantities import LENGTH, vector, whole_number, whole_numbers
 from ..units.types import FloatArray, Vector
-from .shapes import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
+from .shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
 
 _MOST_DRAWS = 10**7
 """Points that may be drawn for one on a part of the wall."""
@@ -28,7 +28,7 @@ def random_points_on(
 
     Parameters
     ----------
-    wall : Plane, Slab, Sphere, Cylinder, Box or Ellipsoid
+    wall : Plane, Slab, Sphere, Cylinder, Capsule, Box or Ellipsoid
     count : int
     seed : int, or several
     lower, upper : (3,) length, optional
@@ -111,6 +111,17 @@ def _on_sphere(sphere, count, generator, low, high):
     return sphere.center + sphere.radius * _directions(count, generator)
 
 
+def _on_capsule(capsule, count, generator, low, high):
+    # Of its area, the half spheres have the share of their diameter in its whole length.
+    along, normals = capsule.axis, _directions(count, generator)
+    on_caps = generator.uniform(size=(count, 1)) * (capsule.length + 2.0 * capsule.radius) > capsule.length
+    heights = (normals @ along)[:, None]
+    across = normals - heights * along
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    height = np.where(on_caps, np.sign(heights), generator.uniform(-1.0, 1.0, (count, 1))) * 0.5 * capsule.length
+    return capsule.center + height * along + capsule.radius * np.where(on_caps, normals, across)
+
+
 def _on_ellipsoid(ellipsoid, count, generator, low, high):
     # Of the unit sphere, an area grows with |n/a| a b c for its direction n and the semi-axes.
     directions = _directions(count, generator)
@@ -134,6 +145,7 @@ _SAMPLERS = {
     Slab: _on_slab,
     Sphere: _on_sphere,
     Cylinder: _on_cylinder,
+    Capsule: _on_capsule,
     Box: _on_box,
     Ellipsoid: _on_ellipsoid,
 }

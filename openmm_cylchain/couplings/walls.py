@@ -19,7 +19,7 @@ from ..filaments.collection import FilamentCollection, require_filaments
 from ..units.quantities import LENGTH, STIFFNESS, in_units_of, positive, shown, whole_numbers
 from ..units.types import FloatArray, Indices, Numbers, Scalar
 from .contacts import outside_particles
-from .shapes import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, number
+from .shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, number
 
 WALL_NAME = "Wall"
 
@@ -67,6 +67,7 @@ def filament_wall_force(
     radius: Numbers = 0.0,
     particles: Indices = (),
     particle_radius: Numbers = 0.0,
+    numbers: Indices | None = None,
 ) -> Any:
     """A wall around the nodes of filaments, which implicit schemes have in their equations.
 
@@ -85,11 +86,13 @@ def filament_wall_force(
     shape : Shape
     stiffness : energy/length^2
         k. A node gets ``(k_BT/k)^(1/2)`` beyond the wall.
-    radius : length, or (filaments,) array of lengths
+    radius : length, or array of lengths, one for each filament that the wall holds
         Distance from the wall that axes of filaments keep, such as half their diameter.
     particles : sequence of int
         Particles outside filaments that the wall keeps in, too.
     particle_radius : length, or array of lengths, one for each of ``particles``
+    numbers : sequence of int, optional
+        Of the filaments that the wall holds; others go through it. All of them if not given.
 
     Returns
     -------
@@ -101,7 +104,8 @@ def filament_wall_force(
     ------
     InputError
         If the compiled engine is missing, for a shape that is none, a stiffness that is not positive, a radius that is
-        negative or does not fit in, or a particle that does not exist or is one of the filaments'.
+        negative or does not fit in, a filament that does not exist, or a particle that does not or is one of the
+        filaments'.
     """
     choose_engine("compiled")
     from .. import plugin
@@ -110,18 +114,32 @@ def filament_wall_force(
         raise InputError(f"shape must be a Shape such as Sphere, but is {shown(shape)}.")
     stiffness = positive(stiffness, STIFFNESS, "stiffness")
     require_filaments(filaments)
-    radii = _radii(radius, len(filaments), "radius", shape)
+    held = _held(numbers, len(filaments))
+    radii = _radii(radius, len(held), "radius", shape)
     spheres = outside_particles(filaments, system, particles)
     sphere_radii = _radii(particle_radius, len(spheres), "particle_radius", shape)
     name, point, direction, length = shape.region
     force = plugin.CylinderChainWallForce(name, openmm.Vec3(*point), openmm.Vec3(*direction), length, stiffness)
     force.setName(f"CylinderChainWallForce ({name})")
-    for filament, nodes, beads, value in zip(filaments, filaments.node_indices, filaments.bead_indices, radii):
-        for place in filament.type.segment_kind.particles_along(nodes, beads):
+    for index, value in zip(held, radii):
+        nodes, beads = filaments.node_indices[index], filaments.bead_indices[index]
+        for place in filaments[index].type.segment_kind.particles_along(nodes, beads):
             force.addParticle(int(place), float(value))
     for particle, value in zip(spheres, sphere_radii):
         force.addParticle(int(particle), float(value))
     return force
+
+
+def _held(numbers, count):
+    if numbers is None:
+        return range(count)
+    held = whole_numbers(numbers, 0, "numbers")
+    for index in held:
+        if index >= count:
+            raise InputError(f"Filament {index} does not exist; there are {count}.")
+    if len(set(held)) < len(held):
+        raise InputError(f"numbers must be those of different filaments, but are {list(held)}.")
+    return held
 
 
 def _radii(value, count, name, shape):
@@ -170,12 +188,13 @@ def shape_of_wall(force: openmm.Force) -> tuple[Shape, float] | None:
 # As number() writes them.
 _NUMBER = re.compile(r"\((-?[0-9][-+.e0-9]*)\)")
 
-# Shapes from the numbers in their formulas. Of a cylinder, there are two directions across its axis.
+# Shapes from the numbers in their formulas. Of a cylinder and a capsule, there are two directions across the axis.
 _READ: dict[str, Callable[[FloatArray], Shape]] = {
     "plane": lambda v: Plane(v[1:6:2], v[0:6:2]),
     "slab": lambda v: Slab(v[1:6:2], v[0:6:2], 2.0 * v[6]),
     "sphere": lambda v: Sphere(v[:3], v[3]),
     "cylinder": lambda v: Cylinder(v[1:6:2], np.cross(v[0:6:2], v[6:12:2]), v[12]),
+    "capsule": lambda v: Capsule(v[1:6:2], v[12:18:2], 2.0 * v[18], v[19]),
     "box": lambda v: Box(v[0:6:2], v[1:6:2]),
     "ellipsoid": lambda v: Ellipsoid(v[1:7:2], v[2:7:2] ** -0.5),
 }

@@ -87,9 +87,9 @@ class Settings:
         value = self.number(*places, default=None)
         return default if value is None else value != 0
 
-    def confining_space(self):
-        """The name of the space that confines it, or None for the first one."""
-        name = self.text(("confine", 2), "confine_spec")
+    def confining_space(self, key="confine"):
+        """The name of the space that confines it by a key, or None for the first one."""
+        name = self.text((key, 2), f"{key}_spec", f"{key}_space")
         return None if name in ("first", "last") else name
 
     def unused(self):

@@ -102,40 +102,44 @@ def add_box(translation):
 
 def add_walls(translation):
     """The [[wall]] tables of what fibers are confined by."""
-    found, free = {}, []
-    for fiber in translation.fibers_made():
-        settings = fiber.settings
-        mode = settings.text("confine")
-        settings.values("confine_stiffness")
-        if mode in OFF:
-            free.append(fiber.name)
+    found, fibers = {}, translation.fibers_made()
+    for fiber in fibers:
+        for key in ("confine", "confine2"):
+            confinement = _confinement(translation, fiber, key)
+            if confinement is not None:
+                found.setdefault(confinement, {})[fiber.name] = fiber.settings.line_of(key)
+    for (name, stiffness), held in found.items():
+        line = next(iter(held.values()))
+        space = translation.space(name)
+        if space is None or space.walls is None:
+            shape = translation.shape_name(name)
+            translation.left_out(f"the wall of the shape {shape}", line, f"walls: {shape}")
             continue
-        if mode not in _CONFINED:
-            translation.left_out(
-                f"confine = {mode} of {fiber.name}", settings.line_of("confine"), f"surfaces: confine = {mode}"
-            )
-            continue
-        stiffness = settings.number(("confine", 1), "confine_stiffness", default=0.0)
-        found.setdefault((settings.confining_space(), stiffness), fiber)
-    if not found:
-        return
-    if len(found) > 1 or free:
-        others = f"{', '.join(free)} is not confined" if free else "they are confined in different ways"
-        translation.left_out(f"walls are for all filaments here, but {others}", None, "walls for some filaments alone")
-    (name, stiffness), fiber = next(iter(found.items()))
-    space, line = translation.space(name), fiber.settings.line_of("confine")
-    if space is None or space.walls is None:
-        shape = translation.shape_name(name)
-        translation.left_out(f"the wall of the shape {shape}", line, f"walls: {shape}")
-        return
+        for wall in space.walls:
+            table = translation.document.table("[[wall]]", line)
+            for key, value in wall.items():
+                table.add(key, value, Note(EXACT, f"confine = inside, {stiffness:g}" if key == "shape" else "", line))
+            table.add("stiffness", quantity(stiffness, "pN/um"), Note(EXACT, "of each node"))
+            if len(held) < len(fibers):
+                names = [translation.type_name(fiber) for fiber in held]
+                table.add("holds", names, Note(EXACT, f"of {', '.join(held)} alone"))
+
+
+def _confinement(translation, fiber, key):
+    # The name of a space and the stiffness of its wall in pN/um, or None.
+    settings = fiber.settings
+    mode, line = settings.text(key), settings.line_of(key)
+    settings.values(f"{key}_stiffness")
+    if mode in OFF:
+        return None
+    if mode not in _CONFINED:
+        translation.left_out(f"{key} = {mode} of {fiber.name}", line, f"surfaces: confine = {mode}")
+        return None
+    stiffness = settings.number((key, 1), f"{key}_stiffness", default=0.0)
     if stiffness <= 0.0:
-        translation.document.note(EXACT, f"confine of {fiber.name} has no stiffness", line)
-        return
-    for wall in space.walls:
-        table = translation.document.table("[[wall]]", line)
-        for key, value in wall.items():
-            table.add(key, value, Note(EXACT, f"confine = inside, {stiffness:g}" if key == "shape" else "", line))
-        table.add("stiffness", quantity(stiffness, "pN/um"), Note(EXACT, "of each node"))
+        translation.document.note(EXACT, f"{key} of {fiber.name} has no stiffness", line)
+        return None
+    return settings.confining_space(key), stiffness
 
 
 def add_simulation(translation):

@@ -165,12 +165,18 @@ def _capsule(sizes, dimensions):
     radius, length = sizes.radius(), sizes.number("length")
     if not radius or length is None or length < 2 * radius:
         return None
+    if length == 2 * radius:
+        return _sphere(sizes, dimensions)
     half = 0.5 * length - radius
     if dimensions == 2:
         volume = 4 * half * radius + math.pi * radius**2
     else:
         volume = 2 * math.pi * half * radius**2 + 4 / 3 * math.pi * radius**3
-    return Space("capsule", _flat([half + radius, radius, radius], dimensions), _along(half, radius), volume)
+    wall = {"shape": "capsule", "length": quantity(2 * half, "um"), "radius": quantity(radius, "um")}
+    # Planar filaments begin where their plane cuts it, which is drawn point by point.
+    region = None if dimensions == 2 else wall
+    sizes_of_box = _flat([half + radius, radius, radius], dimensions)
+    return Space("capsule", sizes_of_box, _along(half, radius), volume, None, [wall], region)
 
 
 def _along(half, radius):

@@ -38,11 +38,10 @@ _BODIES = {
     "field": "fields",
 }
 _DENSITY = ("binding_rate", "unbinding_rate", "aging_rate", "aging", "aging_limit", "unit", "cut_fiber", "flux_speed")
-_OWN_WALLS = ("confine2", "squeeze", "zone_radius")
 _NEEDS = {
     **{("fiber", f"density_{key}"): "densities along filaments" for key in _DENSITY},
     ("fiber", "density"): "densities along filaments",
-    **{("fiber", key): "walls: several, or of their own laws" for key in _OWN_WALLS},
+    ("fiber", "squeeze"): "forces towards a plane",
     ("fiber", "field"): "fields",
     ("fiber", "glue"): "surfaces: glue",
     ("new single", "attach"): "bodies",

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..analysis.runs import Run
-from ..couplings.shapes import Box, Cylinder, Ellipsoid, Plane, Sphere
+from ..couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere
 from ..units.types import FloatArray
 
 _ROUND = 72
@@ -44,6 +44,8 @@ def _outline(wall, points):
         for angle in (np.pi / 4, -np.pi / 4):
             outlines.append(wall.center + axes * _circle(np.array([np.cos(angle), np.sin(angle), 0.0])))
         return outlines
+    if isinstance(wall, Capsule):
+        return _outline_of_capsule(wall)
     if isinstance(wall, Cylinder):
         heights = (points - wall.point) @ wall.axis
         places = np.linspace(heights.min(), heights.max(), 7)
@@ -52,6 +54,18 @@ def _outline(wall, points):
         return rings + [np.array([rings[0][i], rings[-1][i]]) for i in range(0, _ROUND, _ROUND // 8)]
     offsets = (0.0,) if isinstance(wall, Plane) else (-0.5 * wall.thickness, 0.5 * wall.thickness)
     return [line for offset in offsets for line in _grid(wall.point + offset * wall.normal, wall.normal, points)]
+
+
+def _outline_of_capsule(wall):
+    half, circle = 0.5 * wall.length * wall.axis, wall.radius * _circle(wall.axis)
+    rings = [wall.center + share * half + circle for share in (-1.0, 0.0, 1.0)]
+    quarter = np.linspace(0.0, 0.5 * np.pi, _ROUND // 4 + 1)[:, None]
+    for side in circle[: _ROUND // 2 : _ROUND // 8]:
+        # From the tip of one cap to the tip of the other, and back on the far side.
+        cap = half + np.cos(quarter) * wall.radius * wall.axis + np.sin(quarter) * side
+        other = half + np.cos(quarter) * wall.radius * wall.axis - np.sin(quarter) * side
+        rings.append(wall.center + np.concatenate([cap, -other[::-1], -cap, other[::-1]]))
+    return rings
 
 
 def _circle(normal):

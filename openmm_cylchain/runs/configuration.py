@@ -26,6 +26,7 @@ from .tables.couplings import (
     TETHER,
     WALL,
     Contacts,
+    check_walls,
     read_contacts,
     read_link,
     read_pull,
@@ -203,6 +204,7 @@ def _configuration(raw, text, folder, lines):
     monomers = tuple(read_monomers(own, box, walls) for own in tables["monomers"])
     check_names(tables["monomers"], monomers)
     groups = _filaments(tables, solvent, box, folder, monomers)
+    check_walls(tables["wall"], walls, groups)
     linkers = tuple(read_linkers(own, groups, box, read_seed(settings), walls) for own in tables["linkers"])
     configuration = Configuration(
         title,
@@ -338,7 +340,7 @@ def _disturbed(configuration):
             "links": bool(linked & numbers) or any(link.between is None for link in configuration.links),
             "joints": bool(joined & numbers),
             "contacts": configuration.contacts is not None,
-            "walls": bool(configuration.walls),
+            "walls": any(wall.holds(group.type) for wall in configuration.walls),
             "forces": bool(pulled & numbers),
             "tethers": bool(moving & numbers)
             or any(tethered.get(number, 0) + bool(group.clamped) > 1 for number in numbers),

@@ -395,15 +395,25 @@ def _add_particles(configuration, seed, topology, system, positions):
 
 
 def _wall(own, filaments, system, spheres, radii):
+    numbers = [number for number, filament in enumerate(filaments) if own.holds(filament.type)]
+    if own.held_types is not None:
+        spheres, radii = [], []
     if filaments.engine == "compiled":
         room = own.shape.room
         for radius in radii:
             if radius >= room:
                 raise InputError(f"a particle with a radius of {radius:g} nm does not fit into it.")
         return filament_wall_force(
-            filaments, system, own.shape, own.stiffness, own.distance, spheres, radii if len(spheres) else 0.0
+            filaments,
+            system,
+            own.shape,
+            own.stiffness,
+            own.distance,
+            spheres,
+            radii if len(spheres) else 0.0,
+            numbers,
         )
-    nodes = [int(node) for nodes in filaments.node_indices for node in nodes]
+    nodes = [int(node) for number in numbers for node in filaments.node_indices[number]]
     return wall_force(own.shape, own.stiffness, [*nodes, *spheres])
 
 

@@ -23,6 +23,12 @@ bool cylchain::encloses(const Wall& wall, const double* position) {
             const double along = dot(v, r);
             return dot(r, r)-along*along <= wall.length*wall.length;
         }
+        case WallShape::Capsule: {
+            const double along = max(-1.0, min(1.0, dot(v, r)/dot(v, v)));
+            for (int k = 0; k < 3; k++)
+                r[k] -= along*v[k];
+            return dot(r, r) <= wall.length*wall.length;
+        }
         case WallShape::Box:
             return r[0] >= 0 && r[1] >= 0 && r[2] >= 0 && position[0] <= v[0] && position[1] <= v[1] &&
                     position[2] <= v[2];
@@ -49,6 +55,10 @@ bool cylchain::isFlat(const Wall& wall) {
     return wall.shape == WallShape::Plane || wall.shape == WallShape::Slab || wall.shape == WallShape::Box;
 }
 
+bool cylchain::isRound(const Wall& wall) {
+    return wall.shape == WallShape::Sphere || wall.shape == WallShape::Cylinder || wall.shape == WallShape::Capsule;
+}
+
 double cylchain::getRoom(const Wall& wall) {
     const double *p = wall.point, *v = wall.vector;
     switch (wall.shape) {
@@ -58,6 +68,7 @@ double cylchain::getRoom(const Wall& wall) {
             return 0.5*wall.length;
         case WallShape::Sphere:
         case WallShape::Cylinder:
+        case WallShape::Capsule:
             return wall.length;
         case WallShape::Box:
             return 0.5*min(min(v[0]-p[0], v[1]-p[1]), v[2]-p[2]);
@@ -67,8 +78,10 @@ double cylchain::getRoom(const Wall& wall) {
     return 0;
 }
 
-/** A direction at right angles to another one. */
-static void findOrthogonal(const double* direction, double* result) {
+/** A direction at right angles to a vector. */
+static void findOrthogonal(const double* vector, double* result) {
+    const double size = sqrt(dot(vector, vector));
+    const double direction[] = {vector[0]/size, vector[1]/size, vector[2]/size};
     int least = 0;
     for (int k = 1; k < 3; k++)
         if (fabs(direction[k]) < fabs(direction[least]))
@@ -106,6 +119,18 @@ static double findDepthInEllipsoid(const Wall& wall, const double* r, double* gr
     return depth;
 }
 
+/** How many vectors from its point the middle of a round face is that is nearest to a position. */
+static double findPlaceOfMiddle(const Wall& wall, const double* r) {
+    switch (wall.shape) {
+        case WallShape::Cylinder:
+            return dot(wall.vector, r);
+        case WallShape::Capsule:
+            return max(-1.0, min(1.0, dot(wall.vector, r)/dot(wall.vector, wall.vector)));
+        default:
+            return 0;
+    }
+}
+
 double cylchain::findDepth(const Wall& wall, int face, const double* position, double radius, double* gradient) {
     const double* v = wall.vector;
     double r[3];
@@ -123,9 +148,10 @@ double cylchain::findDepth(const Wall& wall, int face, const double* position, d
             return sign*dot(v, r)-0.5*wall.length+radius;
         }
         case WallShape::Sphere:
-        case WallShape::Cylinder: {
-            const bool hasAxis = wall.shape == WallShape::Cylinder;
-            const double along = hasAxis ? dot(v, r) : 0;
+        case WallShape::Cylinder:
+        case WallShape::Capsule: {
+            const bool hasAxis = wall.shape != WallShape::Sphere;
+            const double along = findPlaceOfMiddle(wall, r);
             for (int k = 0; k < 3; k++)
                 r[k] -= along*v[k];
             const double distance = sqrt(dot(r, r));
@@ -148,4 +174,17 @@ double cylchain::findDepth(const Wall& wall, int face, const double* position, d
             return findDepthInEllipsoid(wall, r, gradient)+radius;
     }
     return 0;
+}
+
+void cylchain::addTurning(const Wall& wall, const double* g, double size, double* turning) {
+    const double* axis = wall.vector;
+    const double square = dot(axis, axis);
+    // The caps of a capsule are those of a sphere: there, the gradient has a part along the axis.
+    const bool hasAxis = wall.shape == WallShape::Cylinder ||
+            (wall.shape == WallShape::Capsule && fabs(dot(axis, g)) < 1e-9*sqrt(square));
+    const double along = hasAxis ? 1/square : 0;
+    int entry = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = i; k < 3; k++)
+            turning[entry++] += size*((i == k ? 1 : 0)-g[i]*g[k]-along*axis[i]*axis[k]);
 }

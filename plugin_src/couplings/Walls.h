@@ -12,7 +12,8 @@
     ENTRY(Sphere, "sphere") \
     ENTRY(Cylinder, "cylinder") \
     ENTRY(Box, "box") \
-    ENTRY(Ellipsoid, "ellipsoid")
+    ENTRY(Ellipsoid, "ellipsoid") \
+    ENTRY(Capsule, "capsule")
 
 namespace cylchain {
 
@@ -32,6 +33,7 @@ template <> struct Names<WallShape> {
  *     Cylinder    on the axis               the axis                        the radius
  *     Box         the lower corner          the upper corner                -
  *     Ellipsoid   the center                the semi-axes                   -
+ *     Capsule     the middle                from it to where a cap begins   the radius
  *
  * Normals and axes are unit vectors. Its surface has one or more faces: each plane of a slab or box is one. With the
  * depth d of a particle's surface beyond each face, negative inside, the energy is (k/2) times the sum of d^2 over
@@ -78,6 +80,9 @@ int countFaces(const Wall& wall);
 /** Whether faces are planes. */
 bool isFlat(const Wall& wall);
 
+/** Whether the face is round: as far as the length from the middle, which is a point, a line or a part of one. */
+bool isRound(const Wall& wall);
+
 /**
  * The largest radius, exclusive, of a particle that fits in: infinite for a plane. That of an ellipsoid is its shortest
  * semi-axis.
@@ -95,6 +100,15 @@ double getRoom(const Wall& wall);
  * @return the depth
  */
 double findDepth(const Wall& wall, int face, const double* position, double radius, double* gradient);
+
+/**
+ * Add how a force on a round face turns with the position: a size times 1-g g, without what is along a middle that is a
+ * line, as a symmetric matrix.
+ *
+ * @param gradient     g, that of the depth
+ * @param[out] turning  six numbers
+ */
+void addTurning(const Wall& wall, const double* gradient, double size, double* turning);
 
 } // namespace cylchain
 

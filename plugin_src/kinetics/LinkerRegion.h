@@ -46,9 +46,10 @@ private:
     /** The corners of a box around a closed wall, or a cylinder and a slab across it; false if there is none. */
     bool findBounds(double* lower, double* upper) const {
         for (const Wall& wall : walls)
-            if (wall.shape == WallShape::Sphere || wall.shape == WallShape::Box || wall.shape == WallShape::Ellipsoid) {
+            if (wall.shape != WallShape::Plane && wall.shape != WallShape::Slab && wall.shape != WallShape::Cylinder) {
                 for (int k = 0; k < 3; k++) {
-                    const double half = wall.shape == WallShape::Sphere ? wall.length : wall.vector[k];
+                    const double ofVector = wall.shape == WallShape::Sphere ? 0 : std::fabs(wall.vector[k]);
+                    const double half = ofVector+(wall.shape == WallShape::Ellipsoid ? 0 : wall.length);
                     lower[k] = wall.shape == WallShape::Box ? wall.point[k] : wall.point[k]-half;
                     upper[k] = wall.shape == WallShape::Box ? wall.vector[k] : wall.point[k]+half;
                 }

@@ -29,16 +29,6 @@ const int CHUNK_OF_PARTICLES = 256;
 
 } // namespace
 
-/** Add how a force on a round face turns with it: its share of 1-g g, or of the plane across the axis of a cylinder. */
-static void addTurning(const Wall& wall, const double* g, double size, double* stiffness) {
-    const double* axis = wall.vector;
-    const double along = wall.shape == WallShape::Cylinder ? 1 : 0;
-    int entry = 0;
-    for (int i = 0; i < 3; i++)
-        for (int k = i; k < 3; k++)
-            stiffness[entry++] += size*((i == k ? 1 : 0)-g[i]*g[k]-along*axis[i]*axis[k]);
-}
-
 void WallEquations::setWalls(const WallSystem* newSystem) {
     system = newSystem;
     numFaces = countFaces(system->wall);
@@ -100,11 +90,9 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
                 double* const g = state.gradient;
                 const double depth = findDepth(system->wall, state.face, y, particle.radius, g);
                 state.offset = depth-(g[0]*y[0]+g[1]*y[1]+g[2]*y[2]);
-                const WallShape shape = system->wall.shape;
-                const bool round = shape == WallShape::Sphere || shape == WallShape::Cylinder;
                 // The distance from the middle. Where it is short, there would be more stiffness than steps can have.
                 const double distance = depth-particle.radius+system->wall.length;
-                state.curvature = round ? 1/max(distance, LARGEST_WAY_TO_FACE*system->wall.length) : 0;
+                state.curvature = isRound(system->wall) ? 1/max(distance, LARGEST_WAY_TO_FACE*system->wall.length) : 0;
             }
             state.equation = -1;
             const double beyond = findDepthAt(state, moved)+state.restGap.get();

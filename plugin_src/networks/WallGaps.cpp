@@ -15,18 +15,13 @@ const double LEAST_WAY_TO_MIDDLE = 0.5;
 /** Particles that a thread looks at together. */
 const int CHUNK_OF_WALL_GAPS = 256;
 
-/** How a unit force on a round face turns with it: 1-g g, or across the axis of a cylinder, over the radius. */
+/** How a unit force on a round face turns with it. */
 void findTurning(const Wall& wall, const double* g, double distance, double* turning) {
-    if (wall.shape != WallShape::Sphere && wall.shape != WallShape::Cylinder)
+    if (!isRound(wall))
         return;
-    const double* axis = wall.vector;
-    const double along = wall.shape == WallShape::Cylinder ? 1 : 0;
     // Where the middle is near, there would be more stiffness than steps can have.
-    const double curvature = 0.5/max(distance, LEAST_WAY_TO_MIDDLE*wall.length);
-    int entry = 0;
-    for (int i = 0; i < 3; i++)
-        for (int k = i; k < 3; k++)
-            turning[entry++] = curvature*((i == k ? 1 : 0)-g[i]*g[k]-along*axis[i]*axis[k]);
+    fill_n(turning, 6, 0.0);
+    addTurning(wall, g, 0.5/max(distance, LEAST_WAY_TO_MIDDLE*wall.length), turning);
 }
 
 } // namespace

@@ -11,6 +11,7 @@ from openmm import unit
 from openmm_cylchain import (
     F_ACTIN,
     Box,
+    Capsule,
     Cylinder,
     Ellipsoid,
     Filaments,
@@ -18,8 +19,10 @@ from openmm_cylchain import (
     Plane,
     Slab,
     Sphere,
+    constant_force,
     filament_wall_force,
     wall_force,
+    wall_forces,
 )
 from openmm_cylchain.couplings.walls import as_filament_wall_force
 from openmm_cylchain.engines.compiled import plugin
@@ -36,6 +39,7 @@ SMALLER = [
     (Slab([1, 2, 3], [0, 1, 1], 3), Slab([1, 2, 3], [0, 1, 1], 2.2)),
     (Sphere([0, 1, 0], 2), Sphere([0, 1, 0], 1.6)),
     (Cylinder([0, 1, 0], [1, 1, 0], 2), Cylinder([0, 1, 0], [1, 1, 0], 1.6)),
+    (Capsule([0, 1, 0], [1, 1, 0], 3, 1), Capsule([0, 1, 0], [1, 1, 0], 3, 0.6)),
     (Box([-1, -2, -1], [1, 2, 3]), Box([-0.6, -1.6, -0.6], [0.6, 1.6, 2.6])),
     (Ellipsoid([0, 1, 0], [2, 2, 2]), Ellipsoid([0, 1, 0], [1.6, 1.6, 1.6])),
 ]
@@ -118,6 +122,35 @@ def test_filaments_and_particles_have_radii_of_their_own():
     np.testing.assert_allclose(forces_of(new_context(_alone(system, force), points))[:, 2], [1, 0, 2, 6, 2])
 
 
+def test_a_wall_holds_some_filaments_alone():
+    """Of rods that a force drives at a plane, those stay before it that it holds; others move on at their speed."""
+    filaments = Filaments(VISCOSITY, 0.0)
+    for number in range(3):
+        filaments.add_straight(ACTIN, 1, [0, 200 * number, 100], [1, 0, 0])
+    _, system, positions = filaments.build()
+    outside = system.addParticle(1.0)
+    wall = filament_wall_force(
+        filaments, system, Plane([0, 0, 0], [0, 0, 1]), 2.0, [1, 3], [outside], 5, numbers=[2, 0]
+    )
+    held = [wall.getParticle(index) for index in range(5)]
+    assert held == [*filaments.node_indices[2], *filaments.node_indices[0], outside]
+    assert [wall.getParticleRadius(index)._value for index in range(5)] == [1, 1, 3, 3, 5]
+    system.addForce(wall)
+    speed = 1e-6
+    friction = ACTIN.segment_friction(VISCOSITY, TEMPERATURE, 1).perpendicular
+    system.addForce(constant_force(range(6), [0, 0, -0.5 * speed * friction]))
+    integrator = filaments.create_integrator(system, 2e6, random_seed=1, particle_friction=1e3, checks=False)
+    context = new_context(system, np.vstack([positions._value, [0, 900, 900]]), integrator)
+    integrator.step(500)
+    heights = positions_of(context)[:6, 2]
+    np.testing.assert_allclose(heights[2:4], 100 - 1e9 * speed, rtol=1e-6)
+    depth = 0.5 * speed * friction / 2.0
+    np.testing.assert_allclose(heights[[0, 1, 4, 5]], [3 - depth, 3 - depth, 1 - depth, 1 - depth], atol=1e-4)
+    (found,) = wall_forces(context)
+    on_filaments = found.on_filaments(filaments)._value
+    assert not on_filaments[1].any() and np.all(on_filaments[[0, 2], 2] > 0)
+
+
 # Force objects
 
 
@@ -175,6 +208,9 @@ def test_bad_input_is_refused():
         ((sphere, 1, [1, 1, 1]), "radius must be a number or have 2 entries"),
         ((sphere, 1, 1, [0]), "belongs to a filament"),
         ((sphere, 1, 1, [99]), "the System has 8 particles"),
+        ((sphere, 1, 0, (), 0, [2]), "Filament 2 does not exist; there are 2"),
+        ((sphere, 1, 0, (), 0, [1, 1]), "numbers must be those of different filaments"),
+        ((sphere, 1, [1, 1], (), 0, [1]), "radius must be a number or have 1 entries"),
     ):
         with pytest.raises(InputError, match=message):
             filament_wall_force(filaments, system, *arguments)
@@ -186,6 +222,8 @@ def test_bad_input_is_refused():
         (lambda: force.setRegion("sphere", openmm.Vec3(0, np.nan, 0), up, 1), "finite"),
         (lambda: force.setRegion("box", up, origin, 0), "must exceed"),
         (lambda: force.setRegion("ellipsoid", origin, up, 0), "must be positive"),
+        (lambda: force.setRegion("capsule", origin, origin, 1), "cannot be the zero vector"),
+        (lambda: force.setRegion("capsule", origin, up, 0), "must be positive"),
         (lambda: force.setStiffness(-1), "cannot be negative"),
         (lambda: force.addParticle(-1), "Illegal particle index"),
         (lambda: force.addParticle(0, -1), "cannot be negative"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from openmm import unit
 
-from openmm_cylchain import Box, Cylinder, Ellipsoid, InputError, Plane, Slab, Sphere, random_points_on
+from openmm_cylchain import Box, Capsule, Cylinder, Ellipsoid, InputError, Plane, Slab, Sphere, random_points_on
 
 COUNT = 20000
 LOWER, UPPER = np.array([-40.0, -60.0, -50.0]), np.array([70.0, 50.0, 30.0])
@@ -15,6 +15,7 @@ SHAPES = {
     "cylinder": Cylinder([1, 2, 3], TILTED, 25.0),
     "sphere": Sphere([5, 0, 0], 45.0),
     "box": Box([-10, -20, -30], [20, 30, 40]),
+    "capsule": Capsule([5, 0, -5], TILTED, 40.0, 20.0),
     "ellipsoid": Ellipsoid([5, 0, 0], [60, 20, 35]),
 }
 
@@ -36,6 +37,16 @@ def _areas_beyond(shape, heights):
         sine = np.sqrt(1 - cosine**2)
         normal = np.stack([sine * np.cos(angle), sine * np.sin(angle), cosine], -1)
         faces = [(shape.center + normal * axes, np.linalg.norm(normal / axes, axis=-1))]
+    elif isinstance(shape, Capsule):
+        across = np.linalg.svd(shape.axis[None])[2][1:]
+        angle, cosine = 2 * np.pi * other, 2 * one - 1
+        round_ = np.cos(angle)[..., None] * across[0] + np.sin(angle)[..., None] * across[1]
+        side = shape.radius * round_ + shape.length * (one[..., None] - 0.5) * shape.axis
+        height = shape.radius * cosine + 0.5 * shape.length * np.sign(cosine)
+        sine = np.sqrt(1 - cosine**2)
+        caps = height[..., None] * shape.axis + shape.radius * sine[..., None] * round_
+        sizes = shape.length, 2 * shape.radius
+        faces = [(shape.center + own, np.full(one.shape, size)) for own, size in zip((side, caps), sizes)]
     else:
         normal = shape.axis if isinstance(shape, Cylinder) else shape.normal
         across = np.linalg.svd(normal[None])[2][1:]
@@ -62,7 +73,7 @@ def test_points_are_on_walls_with_the_same_chance_for_each_area(name):
     np.testing.assert_allclose(shape.square_depth(points), 0.0, atol=1e-15)
     # A little beyond: no point is inside.
     outward = points + 1e-6 * np.sign(points - 0.5) if isinstance(shape, Box) else None
-    if isinstance(shape, (Sphere, Ellipsoid)):
+    if isinstance(shape, (Sphere, Ellipsoid, Capsule)):
         outward = points + 1e-6 * (points - shape.center)
     elif isinstance(shape, Cylinder):
         apart = points - shape.point

@@ -6,7 +6,7 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError
-from openmm_cylchain.couplings.shapes import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
+from openmm_cylchain.couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
 from openmm_cylchain.couplings.walls import wall_force
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
@@ -110,6 +110,9 @@ def test_bad_input_is_refused():
         (lambda: Cylinder([0, 0, np.nan], [1, 0, 0], 1), "Cylinder: point must be finite"),
         (lambda: Cylinder([0, 0, 0], [1, 0, 0], 1 * unit.kelvin), "Cylinder: radius has the unit"),
         (lambda: Box([0, 0, 0], [1, 0, 1]), "Box: upper must exceed lower"),
+        (lambda: Capsule([0, 0, 0], [0, 0, 0], 1, 1), "Capsule: direction must not be the zero vector"),
+        (lambda: Capsule([0, 0, 0], [1, 0, 0], 0, 1), "Capsule: length must be positive"),
+        (lambda: Capsule([0, 0, 0], [1, 0, 0], 1, -1), "Capsule: radius must be positive"),
         (lambda: Ellipsoid([0, 0, 0], [1, -1, 1]), "Ellipsoid: semi_axes must be positive"),
         (lambda: wall_force("sphere", 1, []), "shape must be a Shape"),
         (lambda: wall_force(SHAPES[0], 0, []), "stiffness must be positive"),

@@ -22,6 +22,7 @@ static const vector<Wall> WALLS = {
     wallOf(WallShape::Cylinder, {1, 0, 0}, {0.6, 0, 0.8}, 1.5),
     wallOf(WallShape::Box, {-1, -2, -1}, {2, 1, 1}, 0),
     wallOf(WallShape::Ellipsoid, {0.1, 0, 0}, {1, 2, 3}, 0),
+    wallOf(WallShape::Capsule, {0.2, -0.1, 0.3}, {0.9, 0, -1.2}, 1),
 };
 
 static double sumOfSquares(const Wall& wall, const double* x, double radius) {
@@ -67,6 +68,15 @@ static double squareByHand(const Wall& wall, const double* x) {
             q += pow(r[k]/(v[k]*v[k]), 2);
         }
         return beyond((sqrt(s)-1)*sqrt(s)/sqrt(q));
+    }
+    case WallShape::Capsule: {
+        // From the axis, or from the end of it that is nearer.
+        double size = 0, toEnd = 0;
+        for (int k = 0; k < 3; k++)
+            size += v[k]*v[k];
+        for (int k = 0; k < 3; k++)
+            toEnd += pow(r[k]-(along > 0 ? v[k] : -v[k]), 2);
+        return beyond(sqrt(fabs(along) < size ? square-along*along/size : toEnd)-wall.length);
     }
     }
     throw runtime_error("The tests do not know a shape");
@@ -129,6 +139,41 @@ static void testGradients() {
         }
 }
 
+/** How a force turns, against differences of gradients. */
+static void testTurning() {
+    NormalNumbers normal(4);
+    const double width = 1e-5;
+    int caps = 0;
+    for (const Wall& wall : WALLS) {
+        if (!isRound(wall))
+            continue;
+        for (int i = 0; i < 200; i++) {
+            Array x = normal(3);
+            double g[3], above[3], below[3], turning[6] = {};
+            const double distance = findDepth(wall, 0, x.data(), 0, g)+wall.length;
+            if (distance < 0.1)
+                continue;
+            double along = 0;
+            for (int k = 0; k < 3; k++)
+                along += g[k]*wall.vector[k];
+            caps += wall.shape == WallShape::Capsule && fabs(along) > 1e-9;
+            addTurning(wall, g, 1/distance, turning);
+            int entry = 0;
+            for (int j = 0; j < 3; j++)
+                for (int k = j; k < 3; k++) {
+                    const double here = x[k];
+                    x[k] = here+width;
+                    findDepth(wall, 0, x.data(), 0, above);
+                    x[k] = here-width;
+                    findDepth(wall, 0, x.data(), 0, below);
+                    x[k] = here;
+                    checkClose((above[j]-below[j])/(2*width), turning[entry++], 1/distance, 1e-4, "a turning force");
+                }
+        }
+    }
+    check(caps > 20 && caps < 180, "positions beside the cylinder and beside the caps");
+}
+
 static void testMiddles() {
     for (const Wall& wall : WALLS) {
         if (wall.shape == WallShape::Box || wall.shape == WallShape::Plane)
@@ -142,7 +187,7 @@ static void testMiddles() {
             along += gradient[k]*wall.vector[k];
         }
         checkClose(1, square, 1, 1e-12, "a direction in the middle");
-        if (wall.shape == WallShape::Cylinder)
+        if (wall.shape == WallShape::Cylinder || wall.shape == WallShape::Capsule)
             checkClose(0, along, 1, 1e-12, "a direction across the axis");
     }
     checkClose(1, getRoom(WALLS[4]), 1, 0, "the room in a box");
@@ -150,5 +195,5 @@ static void testMiddles() {
 }
 
 int main() {
-    return runTests({testDepths, testRadii, testGradients, testMiddles});
+    return runTests({testDepths, testRadii, testGradients, testTurning, testMiddles});
 }

@@ -420,8 +420,30 @@ def test_walls_contacts_and_boxes(tmp_path):
     found, _ = translated(tmp_path, TUBE + "new 3 tube { length = 2 }\n", cell=periodic)
     assert found.box == (5000.0, 6000.0, 7000.0)
     capsule = "set space cell { shape = capsule }\nnew cell { length = 8; radius = 1 }\n"
-    _, document = translated(tmp_path, own, cell=capsule)
-    assert document.missing == ["walls: capsule"]
+    found, document = translated(tmp_path, own, cell=capsule)
+    assert found.walls[0].shape.length == 6000 and found.walls[0].shape.radius == 1000
+    assert document.missing == []
+
+
+def test_walls_of_some_fibers_and_several_of_one(tmp_path):
+    cells = "set space cell { shape = sphere }\nnew cell { radius = 9 }\n"
+    cells += "set space core { shape = capsule }\nnew core { length = 8; radius = 2 }\n"
+    fibers = (
+        "set fiber tube { rigidity = 20; confine = inside, 200; confine2 = inside, 50, core }\n"
+        "set fiber actin { rigidity = 0.07; confine = inside, 200 }\n"
+        "set fiber free { rigidity = 0.07 }\n"
+    )
+    made = "new 3 tube { length = 2 }\nnew 2 actin { length = 1 }\n"
+    found, document = translated(tmp_path, fibers + made, cell=cells)
+    assert [wall.shape.radius for wall in found.walls] == [9000, 2000]
+    assert [wall.held_types for wall in found.walls] == [None, ("tube",)]
+    assert found.walls[1].stiffness == pytest.approx(found.walls[0].stiffness / 4)
+    assert document.missing == []
+    found, document = translated(tmp_path, fibers + made + "new free { length = 1 }\n", cell=cells)
+    assert [wall.held_types for wall in found.walls] == [("tube", "actin"), ("tube",)]
+    outside = fibers.replace("inside, 50", "outside, 50")
+    _, document = translated(tmp_path, outside + made, cell=cells)
+    assert document.missing == ["surfaces: confine = outside"]
 
 
 def test_two_dimensions_are_found(tmp_path):

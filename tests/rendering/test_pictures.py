@@ -12,7 +12,7 @@ from PIL import Image
 
 from openmm_cylchain import InputError, Plane, Slab, Sphere, analysis
 from openmm_cylchain.cli import main
-from openmm_cylchain.couplings.shapes import Box, Cylinder, Ellipsoid
+from openmm_cylchain.couplings.shapes import Box, Capsule, Cylinder, Ellipsoid
 from openmm_cylchain.output.colors import PLUS_END_COLOR, colors_of_filaments
 from openmm_cylchain.rendering.annotations import Margins, clock_text, margins, scale_bar_length
 from openmm_cylchain.rendering.camera import camera_on
@@ -313,6 +313,7 @@ WALLS = [
     Sphere([100, 0, 0], 3000),
     Ellipsoid([0, 0, 0], [3000, 2000, 1000]),
     Cylinder([0, 0, 0], [1, 1, 0], 2000),
+    Capsule([100, 0, 0], [1, 1, 0], 3000, 1000),
     Box([-2000] * 3, [3000] * 3),
     Slab([0, 0, 10], [0, 0, 1], 900),
     Plane([0, 0, -500], [0, 1, 1]),

@@ -14,6 +14,7 @@ from openmm import unit
 from openmm_cylchain import (
     F_ACTIN,
     Box,
+    Capsule,
     Crosslinks,
     Cylinder,
     Ellipsoid,
@@ -31,6 +32,7 @@ from openmm_cylchain import (
     theory,
     wall_force,
 )
+from openmm_cylchain.couplings.walls import as_filament_wall_force
 from openmm_cylchain.output.progress import LateMessages
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
 from openmm_cylchain.runs.initial_state import build_system
@@ -56,6 +58,8 @@ LINK = '[[link]]\nbetween = [{ filament = 0, arc_length = "150 nm" }, { filament
 LINK += 'stiffness = "0.1 pN/nm"\n'
 TETHER = '[[tether]]\nfilament = 0\nnode = -1\nstiffness = "0.1 pN/nm"\n'
 PULL = '[[pull]]\nfilament = 1\ntension = "2 pN"\n'
+MONOMERS = '[[monomers]]\ntype = "ACTIN_ATP"\nconcentration = "5 uM"\n'
+GROWTH = 'growth = { longest = "1 um" }\n'
 CONTACTS = '[contacts]\ndiameter = "15 nm"\n'
 PARTICLES = '[[particles]]\ndiameter = "50 nm"\npositions = [["0 nm", "0 nm", "1 um"], ["0 nm", "1 um", "0 nm"]]\n'
 ACTIN = F_ACTIN.with_segment_length(100.0)
@@ -89,6 +93,7 @@ def assert_same_system(one, system):
         ('shape = "sphere"\ncenter = ["0 nm", "5 nm", "0 nm"]\nradius = "2 um"', Sphere([0, 5, 0], 2000)),
         ('shape = "cylinder"\naxis = [0, 0, 2]\nradius = "2 um"', Cylinder([0, 0, 0], [0, 0, 2], 2000)),
         ('shape = "box"\nlower = ["-1 um", "-1 um", "-1 um"]\nupper = ["1 um", "1 um", "2 um"]', None),
+        ('shape = "capsule"\nlength = "4 um"\nradius = "2 um"', Capsule([0, 0, 0], [1, 0, 0], 4000, 2000)),
         ('shape = "ellipsoid"\nsemi_axes = ["1 um", "2 um", "3 um"]', Ellipsoid([0, 0, 0], [1000, 2000, 3000])),
     ],
 )
@@ -214,6 +219,9 @@ def test_places_in_a_region():
         'shape = "cylinder", axis = [0, 0, 1], radius = "250 nm", length = "1.5 um"': lambda x: (
             (np.hypot(x[:, 0], x[:, 1]) <= 250) & (abs(x[:, 2]) <= 750)
         ),
+        'shape = "capsule", axis = [1, 1, 0], radius = "250 nm", length = "1 um"': lambda x: (
+            Capsule([0, 0, 0], [1, 1, 0], 1000, 250).square_depth(x) == 0
+        ),
         'shape = "box", lower = ["0 um", "0 um", "0 um"], upper = ["1 um", "1 um", "1 um"]': lambda x: (
             (x >= 0) & (x <= 1000)
         ).all(axis=1),
@@ -250,6 +258,7 @@ VOLUMES = {
     'shape = "sphere"\nradius = "500 nm"': (4 / 3 * np.pi * 0.5**3, 4 / 3 * np.pi * 0.5**3),
     'shape = "ellipsoid"\nsemi_axes = ["500 nm", "400 nm", "300 nm"]': (0.08 * np.pi, 0.08 * np.pi),
     'shape = "box"\nlower = ["0 um", "0 um", "0 um"]\nupper = ["1 um", "2 um", "1 um"]': (2.0, 2.0),
+    'shape = "capsule"\nradius = "300 nm"\nlength = "1 um"': (0.126 * np.pi, 0.126 * np.pi),
     'shape = "slit"\nthickness = "200 nm"\nnormal = [0, -2, 0]': (None, 0.8),
     'shape = "cylinder"\nradius = "200 nm"\naxis = [0, 0, 1]': (None, np.pi * 0.08),
     # Larger than the box, askew, or of one side.
@@ -500,6 +509,31 @@ def test_exact_extension_under_tension(tmp_path):
     assert observable.theory == pytest.approx(exact)
     assert abs(observable.deviation) < 4.0 and observable.standard_error < 0.05 / 4 * exact
     assert observable.verdict in ("agrees", "within 5 %")
+
+
+def test_walls_hold_types_of_filaments():
+    """Those that begin later on, too, and no particles; only walls of all are around what is between filaments."""
+    tubes = FILAMENT.replace("F_ACTIN", "MICROTUBULE").replace("segments = 6", "segments = 2")
+    actin = FILAMENT.replace("100 nm", "108 nm")
+    growing = f"{MONOMERS}{actin}reserve = 1\n{GROWTH}{tubes}count = 2\n"
+    own = built(WALL, WALL + 'holds = "F_ACTIN"\n', WALL + 'holds = ["MICROTUBULE"]\n', PARTICLES, filament=growing)
+    walls = list(filter(None, map(as_filament_wall_force, own.system.getForces())))
+    held = [{wall.getParticle(index) for index in range(wall.getNumParticles())} for wall in walls]
+    actin, tubes = (
+        {node for filament, nodes in zip(own.filaments, own.filaments.node_indices) if of(filament) for node in nodes}
+        for of in (lambda one: one.growth is not None, lambda one: one.growth is None)
+    )
+    everything = set(range(own.system.getNumParticles()))
+    assert held == [everything, actin, tubes] and len(everything - actin - tubes) == 2
+    assert sum(filament.growth is not None for filament in own.filaments) == 2
+    assert_refused("names DNA, but filaments of the configuration are ACT", WALL + 'holds = "DSDNA"\n')
+    assert_refused("which nothing says", WALL + 'holds = "F_ACTIN"\n', LINKERS)
+    volume = parse(WALL, WALL.replace("2 um", "1 um") + 'holds = "F_ACTIN"\n', LINKERS).linkers[0].volume
+    assert volume == pytest.approx(4e9 / 3 * np.pi * 8)
+    simulation = TAIL.replace("1 us", "10 ns", 1) + 'engine = "portable"\n'
+    own = build_system(parse(WALL + 'holds = "F_ACTIN"\n', PARTICLES, simulation=simulation), "portable", 3)
+    (wall,) = (force for force in own.system.getForces() if force.getName() == "Wall (sphere)")
+    assert wall.getNumParticles() == 21
 
 
 def test_portable_engine_has_walls_links_and_pulls():

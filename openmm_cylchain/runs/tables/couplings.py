@@ -20,6 +20,7 @@ from ..keys import (
     point,
 )
 from ..table import ACTIVE, TableKind
+from .filament_types import TypeNames
 from .shapes import SHAPE_KEYS, read_shape
 
 CONTACTS = TableKind(
@@ -56,9 +57,10 @@ WALL = TableKind(
             0.0,
             "That axes of filaments keep from the wall, such as their radius.",
         ),
+        Key("holds", TypeNames(), None, "Names of filament types that it is for, and for no particles."),
         ACTIVE,
     ),
-    "A wall around all filaments and particles, see `filament_wall_force`.",
+    "A wall around all filaments and particles, or those of some types, see `filament_wall_force`.",
     repeated=True,
 )
 
@@ -179,7 +181,12 @@ class Wall:
     shape: object
     stiffness: float
     distance: float
+    held_types: tuple | None = None
     number: int = 0
+
+    def holds(self, kind):
+        """Whether it is for filaments of a type."""
+        return self.held_types is None or kind.name in self.held_types
 
 
 @dataclass(frozen=True)
@@ -240,7 +247,22 @@ def read_wall(entries):
     shape = read_shape(entries)
     if entries["distance"] >= shape.room:
         raise entries.at("distance").error(f"must be below {shape.room:g} nm to fit into the shape.")
-    return Wall(shape, entries["stiffness"], entries["distance"], entries.place.path[1])
+    return Wall(shape, entries["stiffness"], entries["distance"], entries["holds"], entries.place.path[1])
+
+
+def walls_of_all(walls):
+    """Shapes of those Walls that hold filaments of all types, and all else."""
+    return [wall.shape for wall in walls if wall.held_types is None]
+
+
+def check_walls(tables, walls, groups):
+    """Raise ConfigurationError for a [[wall]] table that holds no filament of FilamentGroups."""
+    for entries, wall in zip(tables, walls):
+        if not any(wall.holds(group.type) for group in groups):
+            names = sorted({group.type.name for group in groups})
+            raise entries.at("holds").error(
+                f"names {' and '.join(wall.held_types)}, but filaments of the configuration are {', '.join(names)}."
+            )
 
 
 def read_tether(entries, groups):

@@ -9,7 +9,7 @@ from ...mechanics.friction import EndCorrections
 from ...mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from ...theory import calibrated_to_force
 from ...units import quantities as units
-from ..keys import Choice, Inline, Key, Number, Quantity, Text, Whole, WordOrQuantity
+from ..keys import Choice, Inline, Key, Number, Quantity, Text, Whole, WordOrQuantity, as_written
 from ..table import TableKind
 
 PRESETS = {"F_ACTIN": F_ACTIN, "DSDNA": DSDNA, "MICROTUBULE": MICROTUBULE, "DSDNA_BASE_PAIRS": DSDNA_BASE_PAIRS}
@@ -23,6 +23,26 @@ MONOMER_LENGTHS = {
 }
 """Lengths in nm per monomer: subunits of actin (Holmes, Popp, Gebhard and Kabsch, Nature 1990, 347, 44), base pairs,
 and dimers of tubulin in 13 protofilaments."""
+
+
+class TypeNames:
+    """Names of filament types: one, or a list of them."""
+
+    example = '"F_ACTIN"'
+    text = "a name of a type of filaments, or a list of them"
+
+    def read(self, value, place):
+        names = [value] if isinstance(value, str) else value
+        if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
+            raise place.error(
+                'must be a name of a type of filaments, or a list of them, as in ["F_ACTIN"], but is '
+                f"{as_written(names)}."
+            )
+        return tuple(PRESETS[name].name if name in PRESETS else name for name in names)
+
+    def schema(self):
+        return {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}, "minItems": 1}]}
+
 
 _CORRECTIONS = TableKind(
     "end_corrections",

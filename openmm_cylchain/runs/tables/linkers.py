@@ -16,7 +16,8 @@ from ...kinetics.presets import PRESETS
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Flag, Inline, Key, Listing, Number, Pair, Quantity, Text, Whole, as_written, point
 from ..table import Entries, TableKind
-from .filament_types import PRESETS as FILAMENT_PRESETS
+from .couplings import walls_of_all
+from .filament_types import TypeNames
 from .nucleation import has_places
 from .shapes import REGION, REGION_EXAMPLE, Region, volume_within
 from .solvent import EDGES
@@ -42,25 +43,6 @@ _QUANTITIES = {
         "[[filament]].",
     ),
 }
-
-
-class _Names:
-    """Names of filament types: one, or a list of them."""
-
-    example = '"F_ACTIN"'
-    text = "a name of a type of filaments, or a list of them"
-
-    def read(self, value, place):
-        names = [value] if isinstance(value, str) else value
-        if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
-            raise place.error(
-                'must be a name of a type of filaments, or a list of them, as in ["F_ACTIN"], but is '
-                f"{as_written(names)}."
-            )
-        return tuple(FILAMENT_PRESETS[name].name if name in FILAMENT_PRESETS else name for name in names)
-
-    def schema(self):
-        return {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}, "minItems": 1}]}
 
 
 class _Anchors:
@@ -125,7 +107,7 @@ HAND = TableKind(
         Key("strain_share", Number("0.5"), None, "Share of a spring's energy that speeds up unbinding, see `Hand`."),
         Key("walks_backward", Flag(), None, "Whether a load above the stall force drives it back."),
         Key("at_end", Choice(AT_ENDS), None, "What a hand does at the end of a filament."),
-        Key("binds_to", _Names(), None, "Names of filament types; all if not given."),
+        Key("binds_to", TypeNames(), None, "Names of filament types; all if not given."),
         Key(
             "filament_end",
             Inline(_AT_END, _AT_END_EXAMPLE),
@@ -228,14 +210,18 @@ def read_linkers(entries, groups, box, seed, walls=()):
     with entries.naming():
         as_linkers(group.kind, *first, group.anchors, group.bound, 0, group.diffusion, group.planar, region)
     if group.diffusion is not None:
+        if region is None and len(walls_of_all(walls)) < len(walls):
+            raise entries.error(
+                f"linkers that diffuse need a region where walls hold filaments of some types: inside = {REGION_EXAMPLE}."
+            )
         if region is None and not is_closed([wall.shape.region for wall in walls], box is not None):
             raise entries.error(
                 f"linkers that diffuse need a region: inside = {REGION_EXAMPLE}, a [[wall]] that is closed (a sphere, "
-                f"an ellipsoid or a box), or a periodic [box] with edges = {EDGES.example}, in which there may be a "
+                f"a capsule, an ellipsoid or a box), or a periodic [box] with edges = {EDGES.example}, in which there may be a "
                 "slit or a cylinder."
             )
     elif group.count is not None and group.volume is None and (box is None or walls):
-        group = dataclasses.replace(group, volume=_volume(entries, [wall.shape for wall in walls], box))
+        group = dataclasses.replace(group, volume=_volume(entries, walls_of_all(walls), box))
     names = sorted({own.type.name for own in groups})
     for hand in group.kind.hands:
         if box is not None and hand.reach >= 0.5 * min(box):
@@ -282,8 +268,8 @@ def _volume(entries, shapes, box):
     volume = volume_within(shapes, box)
     if volume is None:
         reason = (
-            f"which what there is of [[wall]] and [box] does not say: add a [[wall]] that is closed (a sphere, an "
-            f"ellipsoid or a box{'' if box is None else ' that is no larger than the periodic one'}), or"
+            f"which what there is of [[wall]] and [box] does not say: add a [[wall]] that is closed (a sphere, a "
+            f"capsule, an ellipsoid or a box{'' if box is None else ' that is no larger than the periodic one'}), or"
             if shapes
             else f"which nothing says: add a periodic [box] with edges = {EDGES.example}, or"
         )

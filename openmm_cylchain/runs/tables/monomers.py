@@ -8,6 +8,7 @@ from ...filaments.presets import ACTIN_AGING, ACTIN_ATP, TUBULIN
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Inline, Key, Listing, Quantity, Text, WordOrQuantity
 from ..table import TableKind
+from .couplings import walls_of_all
 from .shapes import volume_within
 from .solvent import EDGES
 
@@ -101,7 +102,7 @@ def read_monomers(entries, box, walls):
         raise entries.error('lacks its rates: add lines such as plus_on_rate = "11.6 1/(uM*s)"')
     volume = entries["volume"]
     if volume == "box":
-        volume = volume_within([wall.shape for wall in walls], box)
+        volume = volume_within(walls_of_all(walls), box)
         if volume is None:
             raise entries.at("volume").error(
                 "is that which walls and the box leave, but they do not say it: add a periodic [box] with edges = "

@@ -2,7 +2,18 @@
 
 import numpy as np
 
-from ...couplings.shapes import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere, bounds_of, volume_of
+from ...couplings.shapes import (
+    Box,
+    Capsule,
+    ClosedShape,
+    Cylinder,
+    Ellipsoid,
+    Plane,
+    Slab,
+    Sphere,
+    bounds_of,
+    volume_of,
+)
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Key, Quantity, direction, point
 from ..table import TableKind
@@ -12,10 +23,11 @@ _SHAPES = {
     "slit": (Slab, ("point", "normal", "thickness")),
     "sphere": (Sphere, ("center", "radius")),
     "cylinder": (Cylinder, ("point", "axis", "radius")),
+    "capsule": (Capsule, ("center", "axis", "length", "radius")),
     "box": (Box, ("lower", "upper")),
     "ellipsoid": (Ellipsoid, ("center", "semi_axes")),
 }
-_BOUNDED = ("sphere", "cylinder", "box", "ellipsoid")
+_BOUNDED = ("sphere", "cylinder", "capsule", "box", "ellipsoid")
 _ORIGIN = (0.0, 0.0, 0.0)
 
 _KEYS = (
@@ -27,9 +39,10 @@ _KEYS = (
     ),
     Key("normal", direction(), (0.0, 0.0, 1.0), "Normal of a plane, to the side of the filaments, or of a slit."),
     Key("thickness", Quantity(units.LENGTH), None, "Distance of the planes of a slit."),
-    Key("center", point(), _ORIGIN, "Centre of a sphere or an ellipsoid."),
-    Key("radius", Quantity(units.LENGTH), None, "Radius of a sphere or a cylinder."),
-    Key("axis", direction(), (1.0, 0.0, 0.0), "Direction of the axis of a cylinder."),
+    Key("center", point(), _ORIGIN, "Centre of a sphere, a capsule or an ellipsoid."),
+    Key("radius", Quantity(units.LENGTH), None, "Radius of a sphere, a cylinder or a capsule."),
+    Key("axis", direction(), (1.0, 0.0, 0.0), "Direction of the axis of a cylinder or a capsule."),
+    Key("length", Quantity(units.LENGTH), None, "Length of a capsule without its caps, which are half spheres."),
     Key("lower", point(), None, "Corner of a box, along the axes of space."),
     Key("upper", point(), None, "The opposite corner."),
     Key("semi_axes", point(), None, "Semi-axes of an ellipsoid along x, y and z."),
@@ -41,19 +54,27 @@ REGION = TableKind(
     "inside",
     (
         Key("shape", Choice(_BOUNDED), REQUIRED, "Shape of the region."),
-        *(key for key in _KEYS if key.name not in ("normal", "thickness")),
-        Key("length", Quantity(units.LENGTH), None, "Length of a cylinder, half of it on either side of its point."),
+        *(key for key in _KEYS if key.name not in ("normal", "thickness", "length")),
+        Key(
+            "length",
+            Quantity(units.LENGTH),
+            None,
+            "Length of a cylinder, half of it on either side of its point, or of a capsule without its caps, which are "
+            "half spheres.",
+        ),
     ),
     "A region in which filaments or particles begin, or linkers diffuse.",
 )
 REGION_EXAMPLE = '{ shape = "sphere", radius = "1 um" }'
 
 
-def read_shape(entries):
-    """The Shape of a table with SHAPE_KEYS; those that its shape does not have are refused."""
+def read_shape(entries, others=()):
+    """The Shape of a table with SHAPE_KEYS; those that its shape does not have are refused, but for others."""
     kind, names = _SHAPES[entries["shape"]]
     every = {key.name for key in _KEYS}
-    entries.refuse(sorted(every - set(names)), f"is none of a {entries['shape']}: that has {', '.join(names)}.")
+    entries.refuse(
+        sorted(every - set(names) - set(others)), f"is none of a {entries['shape']}: that has {', '.join(names)}."
+    )
     entries.require(*(name for name in names if entries[name] is None))
     with entries.naming():
         return kind(*(np.array(entries[name]) if isinstance(entries[name], tuple) else entries[name] for name in names))
@@ -63,12 +84,10 @@ class Region:
     """A bounded region, of Entries of REGION: positions are drawn in it, and asked whether they are in it."""
 
     def __init__(self, entries):
-        self._shape = read_shape(entries)
+        of_region = ("length",) if entries["shape"] == "cylinder" else ()
+        self._shape = read_shape(entries, of_region)
+        entries.require(*(name for name in of_region if entries[name] is None))
         self._length = entries["length"]
-        if entries["shape"] == "cylinder":
-            entries.require("length")
-        else:
-            entries.refuse(("length",), "belongs to a cylinder.")
         self._values = entries.values
         self._lower, self._upper = self._bounds()
 
@@ -110,12 +129,16 @@ class Region:
 
     def draw(self, generator):
         """A random point in it: a (3,) array in nm."""
-        if isinstance(self._shape, Cylinder):
-            # A long one that is tilted fills next to nothing of the box around it.
-            shape, (_, side, other) = self._shape, np.linalg.svd(self._shape.axis[None])[2]
-            radius, angle = shape.radius * np.sqrt(generator.uniform()), generator.uniform(0.0, 2.0 * np.pi)
-            along = self._length * generator.uniform(-0.5, 0.5)
-            return shape.point + along * shape.axis + radius * (np.cos(angle) * side + np.sin(angle) * other)
+        # A long cylinder or capsule that is tilted fills next to nothing of the box around it.
+        shape = self._shape
+        if isinstance(shape, Cylinder):
+            return shape.point + _draw_in_cylinder(shape, self._length, generator)
+        if isinstance(shape, Capsule):
+            if generator.uniform() * (shape.length + 4.0 / 3.0 * shape.radius) < shape.length:
+                return shape.center + _draw_in_cylinder(shape, shape.length, generator)
+            direction = generator.normal(size=3)
+            direction *= shape.radius * np.cbrt(generator.uniform()) / np.linalg.norm(direction)
+            return shape.center + direction + np.copysign(0.5 * shape.length, direction @ shape.axis) * shape.axis
         while True:
             point = generator.uniform(self._lower, self._upper)
             if self.contains(point):
@@ -124,9 +147,17 @@ class Region:
     def contains(self, positions):
         """Whether all positions (..., 3) in nm are in it."""
         inside = self._shape.square_depth(positions) == 0.0
-        if self._length is not None:
+        if isinstance(self._shape, Cylinder):
             inside &= np.abs((np.asarray(positions) - self._shape.point) @ self._shape.axis) <= 0.5 * self._length
         return bool(np.all(inside))
+
+
+def _draw_in_cylinder(shape, length, generator):
+    # From the middle of one around the axis of the shape, with its radius.
+    _, side, other = np.linalg.svd(shape.axis[None])[2]
+    radius, angle = shape.radius * np.sqrt(generator.uniform()), generator.uniform(0.0, 2.0 * np.pi)
+    along = length * generator.uniform(-0.5, 0.5)
+    return along * shape.axis + radius * (np.cos(angle) * side + np.sin(angle) * other)
 
 
 def volume_within(shapes, box):
@@ -139,7 +170,7 @@ def volume_within(shapes, box):
     if len(shapes) > 1:
         return None
     (shape,) = shapes
-    if isinstance(shape, (Box, Sphere, Ellipsoid)):
+    if isinstance(shape, ClosedShape):
         fits = box is None or np.all(np.subtract(*bounds_of(shape)[::-1]) <= box)
         return volume_of(shape) if fits else None
     if box is None or isinstance(shape, Plane):

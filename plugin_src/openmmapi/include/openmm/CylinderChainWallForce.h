@@ -10,7 +10,8 @@
 namespace OpenMM {
 
 /**
- * This class keeps particles in a region: a half space, or the inside of a slab, sphere, cylinder, box or ellipsoid.
+ * This class keeps particles in a region: a half space, or the inside of a slab, sphere, cylinder, box,
+ * ellipsoid or capsule.
  *
  * Where a sphere around a particle gets beyond the surface of the region by a depth d, the energy is (k/2) d^2.  Of a
  * slab or box, each plane counts by itself, so that the energy of a box is that of the distance from it.  The depth of
@@ -25,6 +26,7 @@ namespace OpenMM {
  *     "cylinder"   on the axis                the axis                         the radius
  *     "box"        the lower corner           the upper corner                 -
  *     "ellipsoid"  the center                 the semi-axes                    -
+ *     "capsule"    the middle                 from it to where a cap begins    the radius
  *
  * With other Integrators than CylinderChainIntegrator, and with its explicit schemes, the force is taken at the present
  * positions.  Implicit schemes have it in their equations, unless one of the particles is a virtual site.
@@ -39,7 +41,7 @@ public:
      *
      * @param shape      the name of the shape
      * @param point      see above, measured in nm
-     * @param vector     see above; corners and semi-axes are measured in nm, directions need not be normalized
+     * @param vector     see above; all but directions are measured in nm, which need not be normalized
      * @param length     see above, measured in nm
      * @param stiffness  the stiffness k, measured in kJ/mol/nm^2
      */
@@ -59,7 +61,7 @@ public:
      *
      * @param shape   the name of the shape
      * @param point   see above, measured in nm
-     * @param vector  see above; corners and semi-axes are measured in nm, directions need not be normalized
+     * @param vector  see above; all but directions are measured in nm, which need not be normalized
      * @param length  see above, measured in nm
      */
     void setRegion(const std::string& shape, const Vec3& point, const Vec3& vector, double length);

@@ -124,11 +124,11 @@ KERNEL void computeLinks(int count, int flags, int includesForces, int paddedNum
 /** The depth of a point beyond a face of a wall, negative inside, and how it changes with the point. */
 typedef struct {double depth; Vector gradient;} WallDepth;
 
-/** A direction at right angles to another one. */
+/** A direction at right angles to a vector. */
 inline DEVICE Vector orthogonalTo(Vector v) {
     const double x = fabs(v.x), y = fabs(v.y), z = fabs(v.z);
     const Vector least = make_double3(x <= y && x <= z ? 1 : 0, y < x && y <= z ? 1 : 0, z < x && z < y ? 1 : 0);
-    const Vector across = least-v*product(v, least);
+    const Vector across = least-v*(product(v, least)/product(v, v));
     return across*(1/sqrt(product(across, across)));
 }
 
@@ -173,12 +173,14 @@ inline DEVICE WallDepth depthBeyond(int shape, int face, GLOBAL const double* RE
     else {
         if (shape == WALL_CYLINDER)
             r = r-v*product(v, r);
+        else if (shape == WALL_CAPSULE)
+            r = r-v*fmax(-1.0, fmin(1.0, product(v, r)/product(v, v)));
         const double distance = sqrt(product(r, r));
         found.depth = distance-size;
         if (distance > 1e-12*size)
             found.gradient = r*(1/distance);
         else
-            found.gradient = shape == WALL_CYLINDER ? orthogonalTo(v) : make_double3(0, 0, 1);
+            found.gradient = shape == WALL_SPHERE ? make_double3(0, 0, 1) : orthogonalTo(v);
     }
     return found;
 }

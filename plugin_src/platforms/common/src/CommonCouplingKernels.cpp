@@ -11,7 +11,8 @@ using namespace std;
 
 static_assert((int) WallShape::Plane == layout::WALL_PLANE && (int) WallShape::Slab == layout::WALL_SLAB &&
         (int) WallShape::Sphere == layout::WALL_SPHERE && (int) WallShape::Cylinder == layout::WALL_CYLINDER &&
-        (int) WallShape::Box == layout::WALL_BOX && (int) WallShape::Ellipsoid == layout::WALL_ELLIPSOID, "");
+        (int) WallShape::Box == layout::WALL_BOX && (int) WallShape::Ellipsoid == layout::WALL_ELLIPSOID &&
+        (int) WallShape::Capsule == layout::WALL_CAPSULE, "");
 
 CommonCalcCylinderChainLinkForceKernel::CommonCalcCylinderChainLinkForceKernel(string name, const Platform& platform,
         ComputeContext& cc) : CalcCylinderChainLinkForceKernel(name, platform), cc(cc), coupled(cc), flags(0),
