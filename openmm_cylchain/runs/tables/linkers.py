@@ -212,13 +212,14 @@ def read_linkers(entries, groups, box, seed, walls=()):
     if group.diffusion is not None:
         if region is None and len(walls_of_all(walls)) < len(walls):
             raise entries.error(
-                f"linkers that diffuse need a region where walls hold filaments of some types: inside = {REGION_EXAMPLE}."
+                "linkers that diffuse need a region where walls hold filaments of some types: "
+                f"inside = {REGION_EXAMPLE}."
             )
         if region is None and not is_closed([wall.shape.region for wall in walls], box is not None):
             raise entries.error(
                 f"linkers that diffuse need a region: inside = {REGION_EXAMPLE}, a [[wall]] that is closed (a sphere, "
-                f"a capsule, an ellipsoid or a box), or a periodic [box] with edges = {EDGES.example}, in which there may be a "
-                "slit or a cylinder."
+                f"a capsule, an ellipsoid or a box), or a periodic [box] with edges = {EDGES.example}, in which there "
+                "may be a slit or a cylinder."
             )
     elif group.count is not None and group.volume is None and (box is None or walls):
         group = dataclasses.replace(group, volume=_volume(entries, walls_of_all(walls), box))
