@@ -187,8 +187,8 @@ def _refuse_without_region(linkers, system):
     if not is_closed(walls, system.usesPeriodicBoundaryConditions()):
         raise InputError(
             f"Linkers {linkers.kind.name!r} diffuse, and need a region: give add_linkers one (a Sphere, Box, Capsule "
-            "or Ellipsoid, or a Cylinder with a Slab across it), add a filament_wall_force of such a shape to the System, "
-            "or give that box_vectors, in which there may be a Slab or a Cylinder."
+            "or Ellipsoid, or a Cylinder with a Slab across it), add a filament_wall_force of such a shape to the "
+            "System, or give that box_vectors, in which there may be a Slab or a Cylinder."
         )
 
 
