@@ -48,6 +48,8 @@ class Linkers:
         How many begin with their first hand bound at random places, or their only one within reach of its anchor.
     seed : int
         Of these places.
+    places : tuple of (filament, arc length)
+        Where those begin bound, in nm from the first node, if that is given.
     """
 
     kind: Crosslinker
@@ -57,6 +59,7 @@ class Linkers:
     anchors: np.ndarray | None
     bound: int
     seed: int
+    places: tuple[tuple[int, float], ...] | None = None
 
 
 @dataclass(frozen=True)
