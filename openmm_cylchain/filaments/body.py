@@ -175,8 +175,8 @@ def random_rotation(generator: np.random.Generator, planar: bool = False) -> Flo
 
 
 def rotation_along(direction: FloatArray, generator: np.random.Generator | None = None) -> FloatArray:
-    """A rotation matrix (3, 3) that takes x to a unit vector: z to z for one in the xy plane, or turned about it at random
-    with a generator."""
+    """A rotation matrix (3, 3) that takes x to a unit vector: z to z for one in the xy plane, or turned about it at
+    random with a generator."""
     up = np.array([0.0, 0.0, 1.0]) if generator is None else generator.normal(size=3)
     across = np.cross(up, direction)
     across /= np.linalg.norm(across)

@@ -33,7 +33,8 @@ _HELD = TableKind(
             "distance",
             Quantity(units.LENGTH, "zero"),
             None,
-            "How far from the origin of the body it is held; the radius of its sphere if not given.",
+            "How far from the origin of the body it is held; the radius of its sphere if not given. With [contacts] they "
+            "must not overlap there.",
         ),
         Key(
             "arm_stiffness",
