@@ -110,6 +110,7 @@ def add_walls(translation):
             continue
         stiffness = settings.number(("confine", 1), "confine_stiffness", default=0.0)
         found.setdefault((settings.confining_space(), stiffness), fiber)
+    _add_walls_of_bodies(translation, found, free)
     if not found:
         return
     if len(found) > 1 or free:
@@ -129,6 +130,31 @@ def add_walls(translation):
         for key, value in wall.items():
             table.add(key, value, Note(EXACT, f"confine = inside, {stiffness:g}" if key == "shape" else "", line))
         table.add("stiffness", quantity(stiffness, "pN/um"), Note(EXACT, "of each node"))
+
+
+def _add_walls_of_bodies(translation, found, free):
+    # Walls are those of filaments where these have some, and act on bodies as well.
+    for name in dict.fromkeys(own.property for own in translation.bodies):
+        body = translation.script.properties[name]
+        settings, line = body.settings, body.settings.line_of("confine")
+        mode = settings.text("confine")
+        stiffness = settings.number(("confine", 1), "confine_stiffness", default=0.0)
+        space = settings.confining_space()
+        if mode in OFF or stiffness == 0.0:
+            if found:
+                text = f"{name} is not confined in Cytosim, but walls are for all bodies and filaments here"
+                translation.document.note(NEAREST, text, body.line)
+        elif mode not in _CONFINED:
+            translation.left_out(f"confine = {mode} of {name}", line, f"surfaces: confine = {mode}")
+        elif space not in [own for own, _ in found] and (found or free):
+            text = f"confine = {mode} of {name}: walls are for all bodies and filaments here"
+            translation.left_out(text, line, "walls for some bodies alone")
+        else:
+            if mode != "all_inside":
+                text = f"{name} is inside of walls as a whole; in Cytosim, its points are"
+                translation.document.note(NEAREST, text, line)
+            if not found:
+                found[space, stiffness] = body
 
 
 def add_simulation(translation):

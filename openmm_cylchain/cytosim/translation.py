@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from .bodies import KINDS as BODY_KINDS
+from .bodies import add_bodies
 from .document import LEFT_OUT, NEAREST, Document
 from .filaments import add_filaments
 from .growth import add_monomers
@@ -25,10 +27,6 @@ from .simulation import (
 from .spaces import make_space
 
 _BODIES = {
-    "solid": "bodies: solids",
-    "bead": "bodies: beads",
-    "sphere": "bodies: spheres",
-    "aster": "bodies: asters",
     "nucleus": "bodies: nuclei",
     "fake": "bodies: spindles (fake)",
     "bundle": "bundles of fibers",
@@ -44,7 +42,6 @@ _NEEDS = {
     ("fiber", "field"): "fields",
     ("fiber", "glue"): "surfaces: glue",
     ("run", "event"): "events during a run",
-    ("new single", "attach"): "bodies",
 }
 """What keys need that nothing here asks for, by the kind of what has them."""
 _WITH_EVERY_LENGTH = ("rectangle", "square", "periodic", "strip", "semi_periodic", "ellipse", "dice")
@@ -64,6 +61,7 @@ class Translation:
         self.thermal_energy = thermal_energy(script.simul)
         self.viscosity = script.simul.number("viscosity", default=1.0)
         self.nucleated = []
+        self.bodies: list = []
         self.growings, self.made, self.filament_count, self.start_files = [], [], 0, {}
         self._spaces, self._type_names = {}, {}
         self.dimensions = self._find_dimensions(dimensions)
@@ -176,6 +174,8 @@ class Translation:
                 linked.append(new)
             elif new.kind == "event":
                 add_event(self, new)
+            elif new.kind in BODY_KINDS:
+                add_bodies(self, new)
             elif new.kind in _BODIES:
                 new.settings.take_rest()
                 if count_of(new, self.space()):
@@ -204,8 +204,10 @@ class Translation:
         made = [own.name for own in self.fibers_made()]
         every = []
         for own in self.script.properties.values():
-            if own.kind not in _BODIES and (own.kind != "fiber" or own.name in made):
+            if own.kind not in (*_BODIES, *BODY_KINDS) and (own.kind != "fiber" or own.name in made):
                 every.append((own.settings, own.kind))
+        bodies = {own.property for own in self.bodies}
+        every += [(own.settings, own.kind) for own in self.script.properties.values() if own.name in bodies]
         every += [(new.settings, f"new {new.kind}") for new in self.script.created]
         every += [(self.script.simul, "simul")]
         if self.script.run is not None:

@@ -174,12 +174,11 @@ def random_rotation(generator: np.random.Generator, planar: bool = False) -> Flo
     return (w * w - axis @ axis) * np.eye(3) + 2.0 * np.outer(axis, axis) + 2.0 * w * across
 
 
-def rotation_along(direction: FloatArray, generator: np.random.Generator | None = None) -> FloatArray:
-    """A rotation matrix (3, 3) that takes x to a unit vector: z to z for one in the xy plane, or turned about it at
-    random with a generator."""
-    up = np.array([0.0, 0.0, 1.0]) if generator is None else generator.normal(size=3)
-    across = np.cross(up, direction)
-    across /= np.linalg.norm(across)
+def rotation_along(direction: FloatArray) -> FloatArray:
+    """A rotation matrix (3, 3) that takes x to a unit vector, y to the xy plane, and z to the side of z."""
+    across = np.cross([0.0, 0.0, 1.0], direction)
+    length = float(np.linalg.norm(across))
+    across = across / length if length > 1e-9 else np.array([0.0, 1.0, 0.0])
     return np.stack([direction, across, np.cross(direction, across)], axis=1)
 
 

@@ -91,7 +91,7 @@ BODY = TableKind(
             "direction",
             direction(),
             None,
-            "Where the x axis of their frame points; if not given, each is turned at random.",
+            "Where the x axis of their frame points, with its y axis in the xy plane; if not given, each is turned at random.",
         ),
         Key(
             "planar",
@@ -171,7 +171,7 @@ class BodyGroup:
     def _rotation(self, generator):
         if self.direction is None:
             return random_rotation(generator, self.planar)
-        return rotation_along(np.array(self.direction), None if self.planar else generator)
+        return rotation_along(np.array(self.direction))
 
 
 def read_body(entries, tables, groups, box, seed):
