@@ -16,6 +16,8 @@ KINDS = ("bead", "solid", "sphere", "aster")
 _ONE_SINGLE = re.compile(r"(\d+\s+)?([A-Za-z_]\w*)\s*(.*)", re.DOTALL)
 _LEAST_SHARE = 0.8
 """Of the length of filaments: how far along them a second spring is at most."""
+_LEAST_GAP = 1.05
+"""Of ends of filaments on a body where there are contacts, in diameters."""
 _TYPES = {"radial": "random", "0": "random", "regular": "even", "2": "even"}
 
 
@@ -72,16 +74,30 @@ def add_bodies(translation, new):
 
 def find_bodies(translation, text):
     """The MadeBodies of what a base names, such as solid1 or kinetochore~1, alone in their table; None if there are none."""
-    words = re.fullmatch(r"([A-Za-z_]\w*?)\s*~?\s*(\d+)?", (text or "").strip())
+    words = re.fullmatch(r"([A-Za-z_]\w*?)\s*(~?)\s*(\d+)?", (text or "").strip())
     if words is None:
         return None
-    name, number = words[1], int(words[2] or 1)
-    for own in translation.bodies:
-        if name in (own.name, "solid", "bead", "sphere"):
-            if number <= own.count:
-                return own if own.count == 1 else None
-            number -= own.count
+    there = translation.bodies if translation.there is None else translation.bodies[: translation.there[1]]
+    kinds = {own.property: translation.script.properties[own.property].kind for own in there}
+    found = [own for own in there if words[1] in (own.name, own.property, kinds[own.property])]
+    number = int(words[3] or 0)
+    if words[2] == "~" or number == 0:
+        # name~1 is the last one, as name0 is.
+        found, number = found[::-1], max(number, 1)
+    for own in found:
+        if number <= own.count:
+            return own if own.count == 1 else None
+        number -= own.count
     return None
+
+
+def point_of_base(translation, options):
+    """The number of the body that a base names, and of its point; None if there is no such one."""
+    own = find_bodies(translation, options.text("base"))
+    key = options.text(("base", 1), default="point1")
+    if own is None or key not in own.groups:
+        return None
+    return sum(other.count for other in translation.bodies[: own.number - 1]), own.groups[key][0]
 
 
 def attach_to_bodies(translation, new, count):
@@ -97,17 +113,17 @@ def attach_to_bodies(translation, new, count):
         for own in found:
             own.singles.setdefault(new.name, []).extend([0] * each)
         return True
-    own = find_bodies(translation, options.text("base"))
-    key = options.text(("base", 1), default="point1")
-    if own is None or key not in own.groups:
+    found = point_of_base(translation, options)
+    if found is None:
         return False
-    own.singles.setdefault(new.name, []).extend([own.groups[key][0]] * count)
+    own = find_bodies(translation, options.text("base"))
+    own.singles.setdefault(new.name, []).extend([found[1]] * count)
     return True
 
 
 def _shape_of(translation, kind, options, draw):
     shape = _Shape()
-    if kind in ("bead", "sphere"):
+    if kind in ("bead", "sphere") and "radius" in options:
         radius = _radius(options, "radius")
         shape.add(np.zeros(3), radius)
         if kind == "bead":
@@ -284,13 +300,13 @@ def _add_places(translation, table, new, count, draw):
         text = None
     space = translation.space(options.text(("position", 1)))
     draw = translation.draw_in(space, new.line)
-    if text is None and (fixed or space is None):
+    if text in (None, "inside") and (fixed or space is None):
         if not fixed:
             translation.document.note(NEAREST, f"{new.name} is at the origin, since there is no space", new.line)
         text = "center"
     region = region_of(text, draw) if count > 1 else None
     direction = options.text("direction", "orientation", default="off" if fixed else None)
-    everywhere = count > 1 and text in (None, "inside") and space.shape == "periodic"
+    everywhere = count > 1 and text in (None, "inside") and space is not None and space.shape == "periodic"
     first = None
     if region is not None or everywhere:
         table.add("count", count, Note(EXACT, "", new.line))
@@ -384,6 +400,7 @@ def _add_fibers(translation, new, aster, made, outer, inner):
         translation.left_out(text, line, "fibers that grow where a body holds them")
         return
     # What a [[filament]] table has that stands by itself.
+    inner, crowded = _least_distance(translation, inner, int(number))
     arm = min(abs(outer - inner), _LEAST_SHARE * whole)
     held = {
         "table": table,
@@ -392,8 +409,24 @@ def _add_fibers(translation, new, aster, made, outer, inner):
         "distance": quantity(inner, "um"),
         "arm_stiffness": quantity(stiffness[1], "pN/um"),
         "arm": quantity(arm or 0.5 * whole, "um"),
-        "spread": _TYPES.get(kind, "random"),
+        "spread": "even" if crowded else _TYPES.get(kind, "random"),
     }
+    if crowded:
+        text = "their ends are as far out, and as evenly, as they have to be not to overlap"
+        made.table.comment(Note(NEAREST, text, new.line))
     exact = arm == abs(outer - inner) and kind in _TYPES
     text = "stiffness and radius of the aster" + ("" if exact else ", the second spring nearer where fibers are short")
     made.table.add("filaments", held, Note(EXACT if exact else NEAREST, text, new.line))
+
+
+def _least_distance(translation, distance, count):
+    # From which filaments that are spread evenly do not overlap, and whether the distance was less.
+    if translation.contact_diameter is None or count < 2:
+        return distance, False
+    if translation.dimensions == 2:
+        least = 0.5 * translation.contact_diameter / math.sin(math.pi / count)
+    else:
+        # Neighbours on the spiral are at least 3.09/sqrt(n) apart.
+        least = translation.contact_diameter / (2.0 * math.sin(min(0.5 * 3.0 / math.sqrt(count), 0.5 * math.pi)))
+    least *= _LEAST_GAP
+    return (least, True) if distance < least else (distance, False)

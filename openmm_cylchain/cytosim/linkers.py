@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .attached import GROWING, PLACED
-from .bodies import attach_to_bodies
+from .bodies import attach_to_bodies, point_of_base
 from .document import EXACT, LEFT_OUT, NEAREST, Note, point, quantity
 from .hands import read_hand
 from .places import draw_inside, unknown_position
@@ -36,13 +36,17 @@ class Linked:
 
 
 def add_linkers(translation, news):
-    """Add the singles and couples of Newly created objects: one [[linkers]] table for each property."""
+    """Add singles and couples: one [[linkers]] table for each property.
+
+    ``news`` are Newly created objects, with how many filaments and tables of bodies were there before them.
+    """
     kinds = {}
-    for new in news:
+    for new, *translation.there in news:
         own = translation.script.named(new.name, new.kind, new.line)
         linked = kinds.setdefault(new.name, Linked())
         adder = _couples if own.kind == "couple" else _singles
         adder(translation, own, new, linked)
+    translation.there = None
     on_bodies = [own for bodies in translation.bodies for own in bodies.singles]
     for name in dict.fromkeys([*kinds, *on_bodies]):
         own, linked = translation.script.properties[name], kinds.get(name, Linked())
@@ -150,7 +154,9 @@ def _singles(translation, own, new, linked):
     if "base" in options or "multi_base" in options:
         for key in ("base", "multi_base"):
             options.values(key)
-        if not attach_to_bodies(translation, new, count):
+        if "attach" in options:
+            _join_body(translation, own, new, count)
+        elif not attach_to_bodies(translation, new, count):
             translation.left_out(f"{count} {new.name} on a body", new.line, "bodies: singles on one of several")
         return
     if "attach" in options or "attach1" in options:
@@ -160,6 +166,19 @@ def _singles(translation, own, new, linked):
         linked.count += count
         return
     linked.points += _points(translation, new, count, len(linked.points))
+
+
+def _join_body(translation, own, new, count):
+    # A single that joins a point of a body and a filament.
+    site, base = _site(translation, new.settings, "attach"), point_of_base(translation, new.settings)
+    (hand,) = _hands_of(translation, own)
+    if site is None or base is None or not hand.stays:
+        translation.left_out(f"where {count} {new.name} are attached", new.line, PLACED)
+    elif site["grows"]:
+        translation.left_out(f"{count} {new.name} that join for ever", new.line, GROWING)
+    else:
+        for _ in range(count):
+            _link(translation, own, new, site["at"], {"body": base[0], "body_point": base[1]})
 
 
 def _attached(translation, own, new, linked, count, key):

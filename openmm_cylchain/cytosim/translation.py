@@ -61,7 +61,8 @@ class Translation:
         self.thermal_energy = thermal_energy(script.simul)
         self.viscosity = script.simul.number("viscosity", default=1.0)
         self.nucleated = []
-        self.bodies: list = []
+        # How many filaments and tables of bodies there are when what is translated is created; None for all.
+        self.bodies, self.there = [], None
         self.growings, self.made, self.filament_count, self.start_files = [], [], 0, {}
         self._spaces, self._type_names = {}, {}
         self.dimensions = self._find_dimensions(dimensions)
@@ -107,20 +108,22 @@ class Translation:
 
     def find_filament(self, text):
         """The filament that an attachment names, such as actin1, fiber2 or last; None if there is none."""
-        words = re.fullmatch(r"(last|first|[A-Za-z]\w*?)\s*[:~]?\s*(-?\s*\d+)?", (text or "").strip())
-        if words is None or not self.made:
+        words = re.fullmatch(r"(last|first|[A-Za-z]\w*?)\s*([:~]?)\s*(-?\s*\d+)?", (text or "").strip())
+        made = self.made if self.there is None else self.made[: self.there[0]]
+        if words is None or not made:
             return None
-        name, number = words[1], int((words[2] or "0").replace(" ", ""))
-        made = self.made
+        name, number = words[1], int((words[3] or "0").replace(" ", ""))
         if name == "last":
             index = len(made) - 1 + (number if number <= 0 else -number)
         elif name == "first":
             index = number
         else:
-            if words[2] is None:
+            if words[3] is None:
                 return None
             if name != "fiber":
                 made = [own for own in made if own.name == name]
+            # name~1 is the last one, as name0 is.
+            number = 1 - number if words[2] == "~" else number
             index = number - 1 if number > 0 else len(made) - 1 + number
         return made[index] if 0 <= index < len(made) else None
 
@@ -171,7 +174,7 @@ class Translation:
             if new.kind == "fiber":
                 add_filaments(self, new)
             elif new.kind in ("single", "couple"):
-                linked.append(new)
+                linked.append((new, len(self.made), len(self.bodies)))
             elif new.kind == "event":
                 add_event(self, new)
             elif new.kind in BODY_KINDS:

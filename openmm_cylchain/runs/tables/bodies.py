@@ -16,6 +16,7 @@ from .shapes import REGION, REGION_EXAMPLE, Region
 _TAKEN = ("NOD", "ATT", "BED", "BOD")
 _MOST_BODIES = 10**6
 _TRIES = 2000
+_SAME_PLACE = 1e-6
 _SAID_BY_BODIES = (
     *("position", "direction", "orientation", "inside", "nodes", "tangents", "file", "closed", "normal"),
     *("clamped", "clamped_tangents", "height"),
@@ -288,10 +289,10 @@ def _held(entries, tables, groups, planar, count, points, radii, seed):
     generator = np.random.default_rng(seed)
     directions = _directions(-(-len(numbers) // count), own["spread"], planar, generator)
     places = list(points)
-    bases = [_place(places, distance * vector) for vector in directions]
+    bases = _add_points(places, len(points), distance * directions)
     arms = []
     if own["arm_stiffness"] is not None:
-        arms = [_place(places, (distance + arm) * vector) for vector in directions]
+        arms = _add_points(places, len(points), (distance + arm) * directions)
     growing = held[0].growth is not None
     names = ("end", "stiffness")
     return np.array(places), HeldFilaments(
@@ -343,10 +344,16 @@ def _directions(count, spread, planar, generator):
     return generator.permutation(vectors)
 
 
-def _place(places, vector):
-    # Its number: that of a point there, since no two are in one place.
-    for number, there in enumerate(places):
-        if np.linalg.norm(there - vector) < 1e-6:
-            return number
-    places.append(vector)
-    return len(places) - 1
+def _add_points(places, given, vectors):
+    # Their numbers; where one of those that are given is, or all of them are in one place, there is one point.
+    if not np.any(vectors):
+        vectors, several = vectors[:1], len(vectors)
+    else:
+        several = 1
+    numbers = []
+    for vector in vectors:
+        (there,) = np.nonzero(np.linalg.norm(np.array(places[:given]) - vector, axis=1) < _SAME_PLACE)
+        numbers.append(int(there[0]) if len(there) else len(places))
+        if not len(there):
+            places.append(vector)
+    return numbers * several
