@@ -73,7 +73,7 @@ def add_bodies(translation, new):
 
 
 def find_bodies(translation, text):
-    """The MadeBodies of what a base names, such as solid1 or kinetochore~1, alone in their table; None if there are none."""
+    """The MadeBodies of what a base names, such as solid1 or kinetochore~1, alone in their table, or None."""
     words = re.fullmatch(r"([A-Za-z_]\w*?)\s*(~?)\s*(\d+)?", (text or "").strip())
     if words is None:
         return None

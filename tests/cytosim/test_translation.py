@@ -384,9 +384,9 @@ def test_two_dimensions_are_found(tmp_path):
 
 
 def test_stages_and_bodies_are_said(tmp_path):
-    text = TUBE + "new tube\nset bead ball { confine = off }\nnew 3 ball { radius = 1 }\nrun 5000 system\nnew tube\n"
+    text = TUBE + "new tube\nset field ball { confine = off }\nnew ball\nrun 5000 system\nnew tube\n"
     _, document = translated(tmp_path, text)
-    assert document.missing == ["stages: what changes between runs", "bodies: beads"]
+    assert document.missing == ["stages: what changes between runs", "fields"]
 
 
 def test_fibers_begin_where_they_are_told_to(tmp_path):

@@ -34,8 +34,8 @@ _HELD = TableKind(
             "distance",
             Quantity(units.LENGTH, "zero"),
             None,
-            "How far from the origin of the body it is held; the radius of its sphere if not given. With [contacts] they "
-            "must not overlap there.",
+            "How far from the origin of the body it is held; the radius of its sphere if not given. With [contacts], "
+            "filaments must not overlap there.",
         ),
         Key(
             "arm_stiffness",
@@ -92,7 +92,8 @@ BODY = TableKind(
             "direction",
             direction(),
             None,
-            "Where the x axis of their frame points, with its y axis in the xy plane; if not given, each is turned at random.",
+            "Where the x axis of their frame points, with its y axis in the xy plane; if not given, each is turned at "
+            "random.",
         ),
         Key(
             "planar",
