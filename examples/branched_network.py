@@ -1,11 +1,12 @@
-"""A branched network of actin that pushes an obstacle, against loads.
+"""The force-velocity curve of branched networks of actin that push an obstacle.
 
 Filaments stand on a base. New ones branch off them and off each other near the obstacle, as Arp2/3 complex makes them;
 they grow until a capping protein stops them, and crosslinkers hold all together. So the ends that push are always
 others. The obstacle is a plate that a constant force presses on them. It moves as in a viscous solvent, by what the
-force of the ends on it, over a few steps, exceeds the load. Loads slow it down; filaments bend, and those that it has
-left behind carry nothing. Filaments pass through each other here. So few ends push that the speed is chance, too: what
-is printed are errors within one network, and others differ by more.
+force of the ends on it, over a few steps, exceeds the load. Filaments bend, and those that it has left behind carry
+nothing. Filaments pass through each other here. So few ends push that the speed of a network is chance, too: several
+are pushed at each load, and errors are those of their mean. For comparison, the speed of ends that share the load
+evenly, as many as grow, each of them a Brownian ratchet at the angle of the mothers.
 
     python branched_network.py [folder] [steps]
 """
@@ -37,7 +38,8 @@ from openmm_cylchain import (
     wall_forces,
 )
 
-LOADS = (1.0, 2.5, 5.0, 10.0)  # pN
+LOADS = (1.0, 3.0, 8.0, 16.0)  # pN
+NETWORKS = 4  # at each load
 MOTHERS, PLACES, CROSSLINKERS = 20, 120, 100
 MONOMERS = 20  # of a segment
 ANGLE = np.deg2rad(35)  # of mothers: half of that between them and branches
@@ -58,6 +60,7 @@ COLOURS = ("#0072B2", "#009E73", "#E69F00", "#D55E00")
 GROWING, CAPPED, MOTHER = "#D55E00", "#7FA7C9", "#333333"
 PER_LENGTH = unit.piconewton / unit.nanometer
 PICONEWTON = 0.602214076  # kJ/(mol nm)
+THERMAL_ENERGY = (unit.MOLAR_GAS_CONSTANT_R * TEMPERATURE).value_in_unit(unit.kilojoule_per_mole)
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "output_branched_network")
 steps = int(sys.argv[2]) if len(sys.argv) > 2 else STEPS
@@ -105,10 +108,10 @@ def network(seed):
     return filaments, simulation, obstacle
 
 
-def push(load, number):
+def push(load, seed):
     """The network after all steps, and a course: the time in s, the height of the obstacle, and how many ends grow."""
-    filaments, simulation, obstacle = network(number + 1)
-    if number == 0:
+    filaments, simulation, obstacle = network(seed)
+    if seed == 1:
         with open(folder / "branched.cif", "w") as file:
             positions = simulation.context.getState(positions=True).getPositions()
             app.PDBxFile.writeFile(simulation.topology, positions, file, keepIds=True)
@@ -132,26 +135,36 @@ def grows(grown):
     return (grown.nodes > 0) & (grown.end_states[:, 1] == 0)
 
 
-def speed_and_error(course):
-    """Of the obstacle, in nm/s, in the second half, from the means of three pieces of it."""
-    late = course[len(course) // 2 :]
-    speeds = [np.polyfit(*piece[:, :2].T, 1)[0] for piece in np.array_split(late, 3)]
-    return np.polyfit(*late[:, :2].T, 1)[0], np.std(speeds, ddof=1) / np.sqrt(3)
+def speed(course):
+    """Of the obstacle, in nm/s, in the second half."""
+    return np.polyfit(*course[len(course) // 2 :, :2].T, 1)[0]
 
 
-runs = {load: push(load, number) for number, load in enumerate(LOADS)}
+def shared(load, ends):
+    """The speed in nm/s of an obstacle that so many ends push, which share the load in pN."""
+    work = load / ends * PICONEWTON * ACTIN_ATP.length * np.cos(ANGLE) / THERMAL_ENERGY
+    gain = ACTIN_ATP.plus_on_rate * growth.pool.concentration * np.exp(-work) - ACTIN_ATP.plus_off_rate
+    return 1e12 * gain * ACTIN_ATP.length * np.cos(ANGLE)
+
+
+runs = {load: [push(load, NETWORKS * number + own + 1) for own in range(NETWORKS)] for number, load in enumerate(LOADS)}
 free = 1e12 * (ACTIN_ATP.plus_on_rate * growth.pool.concentration - ACTIN_ATP.plus_off_rate) * ACTIN_ATP.length
-speeds = {load: speed_and_error(course) for load, (*_, course) in runs.items()}
-print(f"{steps} steps of {STEP} at each load. A free end grows by {free:.0f} nm/s")
-for load, (_, _, grown, course) in runs.items():
+print(f"{steps} steps of {STEP} of {NETWORKS} networks at each load. A free end grows by {free:.0f} nm/s")
+speeds, evenly = {}, {}
+for load, networks in runs.items():
+    own = [speed(course) for *_, course in networks]
+    speeds[load] = np.mean(own), np.std(own, ddof=1) / np.sqrt(NETWORKS)
+    ends = np.mean([course[len(course) // 2 :, 2].mean() for *_, course in networks])
+    evenly[load] = shared(load, ends)
+    branches = np.mean([grown.nucleated for _, _, grown, _ in networks])
     print(
-        f"{load:g} pN: the obstacle moves by {speeds[load][0]:.0f} +- {speeds[load][1]:.0f} nm/s; {grown.nucleated} "
-        f"branches have begun, {course[len(course) // 2 :, 2].mean():.0f} ends grow"
+        f"{load:g} pN: the obstacle moves by {speeds[load][0]:.0f} +- {speeds[load][1]:.0f} nm/s, and would by "
+        f"{evenly[load]:.0f} if all ends shared the load; {branches:.0f} branches have begun, {ends:.0f} ends grow"
     )
 
 figure, panels = plt.subplots(2, 2, figsize=(12, 9.5), layout="constrained")
 for panel, load in zip(panels[0], (LOADS[0], LOADS[-1])):
-    filaments, simulation, grown, course = runs[load]
+    filaments, simulation, grown, course = runs[load][0]
     state = simulation.context.getState(positions=True)
     x = state.getPositions(asNumpy=True).value_in_unit(unit.nanometer)
     growing = grows(grown)
@@ -164,17 +177,20 @@ for panel, load in zip(panels[0], (LOADS[0], LOADS[-1])):
     panel.axhline(course[-1, 1], color="#555555", linewidth=1)
     for label, colour in (("growing", GROWING), ("capped", CAPPED), ("capped, from the start", MOTHER)):
         panel.plot([], [], "-o", color=colour, markersize=3, label=label)
-    panel.set(xlim=(-1.2 * RADIUS, 1.2 * RADIUS), ylim=(-20, max(own[-1][-1, 1] for own in runs.values()) + 25))
+    panel.set(xlim=(-1.2 * RADIUS, 1.2 * RADIUS), ylim=(-20, max(own[0][-1][-1, 1] for own in runs.values()) + 25))
     panel.set(aspect="equal", xlabel="x (nm)", ylabel="z (nm)")
     panel.set_title(f"{load:g} pN, after {course[-1, 0]:.2g} s", loc="left")
 panels[0, 0].legend(frameon=False, loc="lower left", fontsize=9)
 heights, curve = panels[1]
-for (load, (*_, course)), colour in zip(runs.items(), COLOURS):
-    heights.plot(*course[:, :2].T, color=colour, linewidth=1.8, label=f"{load:g} pN")
+for (load, networks), colour in zip(runs.items(), COLOURS):
+    for number, (*_, course) in enumerate(networks):
+        heights.plot(*course[:, :2].T, color=colour, linewidth=1.4, label=f"{load:g} pN" if number == 0 else None)
     curve.errorbar(load, speeds[load][0], speeds[load][1], fmt="o", color=colour, markersize=7, capsize=3)
 heights.set(xlabel="time (s)", ylabel="obstacle (nm)")
 heights.legend(frameon=False)
+curve.plot(LOADS, list(evenly.values()), "--", color="#555555", label="if all growing ends shared the load")
 curve.axhline(0, color="#999999", linewidth=0.8)
+curve.legend(frameon=False)
 curve.set(xlabel="load (pN)", ylabel="speed in the second half (nm/s)", xlim=(0, None))
 for panel in panels.flat:
     panel.spines[["top", "right"]].set_visible(False)

@@ -32,6 +32,7 @@ CASES = [
     ("crosslinked_bundle", "bundle", 40, 40, 6 * 31, 6 * 30),
     ("treadmilling", "treadmilling", 60, 60, 24 * 57, 24 * 56),
     ("actin_turnover", "turnover", 60, 60, 32 * 29, 32 * 28),
+    ("turnover_bundle", "turnover", 60, 60, (48 + 96) * 20, (48 + 96) * 19),
     ("microtubule_search", "search", 60, 60, 250 * 32, 250 * 31),
     ("branched_network", "branched", 60, 60, (20 + 120) * 8, (20 + 120) * 7),
     ("force_extension", "dna", 200, 100, 24 * 21, 24 * 20),

@@ -30,6 +30,7 @@ _LENGTHS = 9
 _RANGES = ("range", "position_range", "positions", "position_ends", "translation")
 _PLACEMENT = ("orientation", "direction", "position", "reference", "placement", *_RANGES)
 _OFF_PLACE = ("off", "outside", "surface")
+_PARTS, _MOST_PARTS = 20, 2000
 _MOST_SEGMENTS = 5_000_000
 
 
@@ -228,7 +229,7 @@ def _start(translation, fiber, options, length, growing, note=None):
     return table, segment, segments
 
 
-def _finish(translation, table, fiber, length, whole, count, growing):
+def _finish(translation, table, fiber, length, segment, segments, count, growing):
     first = translation.filament_count
     translation.filament_count += count
     translation.made += [Made(fiber.name, first + own, length, growing is not None) for own in range(count)]
@@ -237,6 +238,8 @@ def _finish(translation, table, fiber, length, whole, count, growing):
     force, end = fiber.settings.vector("end_force", index), fiber.settings.text(("end_force", 1 - index), default="off")
     if force is not None and any(force):
         node = {"plus_end": -1, "minus_end": 0}.get(end)
+        if end == "center" and segments % 2 == 0:
+            node = segments // 2
         if node is None or growing is not None:
             line = fiber.settings.line_of("end_force")
             translation.left_out(f"end_force = {end} of {fiber.name}", line, "forces on ends that grow, or on middles")
@@ -249,7 +252,9 @@ def _finish(translation, table, fiber, length, whole, count, growing):
     if growing is None:
         return
     growing.length += count * length
-    add_growth(translation, "filament", table, fiber, max(length, whole), growing)
+    if any(key == "severing_rate" for key, *_ in growing.entries):
+        table.add("reserve", min(_MOST_PARTS, _PARTS * count), Note(NEAREST, "places for parts of those that are cut"))
+    add_growth(translation, "filament", table, fiber, max(length, segment * segments), growing)
 
 
 def add_growth(translation, name, table, fiber, length, growing):
@@ -276,8 +281,8 @@ def _add_shape(translation, fiber, options, points, growing):
     if options.text("placement") != "off":
         nodes = _placed(translation, options, nodes)
     table.add("nodes", [point(node) for node in nodes], Note(EXACT, "shape", options.line_of("shape")))
-    _finish(translation, table, fiber, length, segment * segments, 1, growing)
-    add_attached(translation, options, 1)
+    _finish(translation, table, fiber, length, segment, segments, 1, growing)
+    add_attached(translation, options, 1, segments)
 
 
 def _with_equal_steps(nodes, segment):
@@ -317,14 +322,15 @@ def _add_group(translation, fiber, options, length, count, growing, note=None):
         table.add("start", "straight", Note(EXACT, "as in Cytosim"))
     if not _add_region(translation, table, options, whole, count):
         _add_places(translation, table, options, segment, segments, count, equilibrate > 0.0)
-    _finish(translation, table, fiber, length, whole, count, growing)
-    add_attached(translation, options, count)
+    _finish(translation, table, fiber, length, segment, segments, count, growing)
+    add_attached(translation, options, count, segments)
 
 
 def _read_placement(translation, options):
     for key in _PLACEMENT:
         options.values(key)
-    word = unknown_position(options.text("position", default="inside"))
+    space = _own_space(translation, options)
+    word = unknown_position(options.text("position", default="inside"), space)
     if word is not None:
         translation.left_out(
             f"the position {options.text('position')!r}, for which they begin anywhere in the space",
@@ -332,7 +338,7 @@ def _read_placement(translation, options):
             f"positions: {word}",
         )
         options.set("position", ["inside"], options.line_of("position"))
-    draw = translation.draw_in(_own_space(translation, options), options.line)
+    draw = translation.draw_in(space, options.line)
     for key in ("direction", "orientation"):
         try:
             draw_direction(options.text(key), np.array([0.3, 0.2, 0.0]), draw)

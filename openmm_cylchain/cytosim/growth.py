@@ -16,7 +16,7 @@ _STILL, _GROWING, _SHRINKING = 0, 1, 4
 _ENDS = ("plus", "minus")
 _KEYS = ("growing_speed", "shrinking_speed", "growing_force", "growing_off_speed", "total_polymer", "min_length")
 _KEYS += ("max_length", "persistent", "fate", "delete_stub", "rebirth_rate", "catastrophe_rate", "hydrolysis_rate")
-_KEYS += ("catastrophe_rate_stalled", "rescue_rate", "unit_length")
+_KEYS += ("catastrophe_rate_stalled", "rescue_rate", "unit_length", "catastrophe_length")
 _USUAL_MONOMER = 0.008
 _REFERENCE = 1.0
 """Concentration in uM at which all of the polymer is free."""
@@ -24,6 +24,8 @@ _PER_UM3 = 602.214076
 """Number in 1 um^3 at 1 uM."""
 _NO_FORCE = 1e6
 """In pN: a growing_force so large that loads change nothing."""
+_NEW_ENDS = "growth: states of new ends"
+_EVERY_KEY = 2**32 - 1
 _MOST_LENGTH, _MANY_CATASTROPHES = 200.0, 20.0
 
 
@@ -57,12 +59,13 @@ def read_growth(translation, fiber, options):
     """The Growing of fibers of a Property that are created with options, or None if they do not grow."""
     settings = fiber.settings
     activity = settings.text("activity", default="none")
+    cutting = find_cutting(translation.script, fiber)
     states = {end: state_of(options, end) for end in _ENDS}
     # Those of other activities mean nothing in Cytosim either.
     for key in _KEYS:
         settings.values(key)
     if activity in ("none", "fiber", ""):
-        return None
+        return _of_still(translation, fiber, cutting)
     if activity not in _LAWS:
         translation.left_out(
             f"activity = {activity} of {settings.label}", settings.line_of("activity"), "growth: " + activity
@@ -70,21 +73,76 @@ def read_growth(translation, fiber, options):
         return None
     rebirth = settings.number("rebirth_rate", default=0.0) > 0.0
     if all(state == _STILL for state in states.values()) and not rebirth:
-        translation.document.note(EXACT, f"{fiber.name}: both ends are static, so it keeps its length", options.line)
-        return None
+        if cutting is None:
+            text = f"{fiber.name}: both ends are static, so it keeps its length"
+            translation.document.note(EXACT, text, options.line)
+        return _of_still(translation, fiber, cutting)
     monomer = settings.number("unit_length", default=_USUAL_MONOMER if activity == "dynamic" else None)
     if monomer is None:
-        segment = settings.number("segmentation", default=1.0)
-        monomer = segment / max(2, round(segment / _USUAL_MONOMER))
+        monomer = _usual_monomer(settings)
     if not 0.0 < monomer < math.inf:
         raise settings.mistake("unit_length" if "unit_length" in settings else "segmentation", "must be positive.")
     growing = Growing(fiber.name, settings, monomer)
     _LAWS[activity](translation, growing, states)
     if not growing.rates and len(growing.entries) > 1 and activity not in ("classic", "dynamic"):
-        translation.document.note(EXACT, f"{fiber.name}: its speeds are zero, so it keeps its length", options.line)
-        return None
+        if cutting is None:
+            text = f"{fiber.name}: its speeds are zero, so it keeps its length"
+            translation.document.note(EXACT, text, options.line)
+        return _of_still(translation, fiber, cutting)
+    if cutting is not None:
+        _add_cutting(translation, growing, cutting)
     _add_ends(translation, growing, activity, rebirth)
     return growing
+
+
+def _usual_monomer(settings):
+    segment = settings.number("segmentation", default=1.0)
+    return segment / max(2, round(segment / _USUAL_MONOMER))
+
+
+def find_cutting(script, fiber):
+    """The hand that cuts fibers of a Property of a Script, as a Property; None if none does."""
+    own = binding_key(fiber.settings.number("binding_key"))
+    for kind in ("single", "couple"):
+        for new in (new for new in script.created if new.kind == kind):
+            for key in ("hand", "hand1", "hand2"):
+                hand = script.properties.get(script.properties[new.name].settings.peek(key))
+                if hand is None or hand.settings.peek("activity") != "cut":
+                    continue
+                if hand.settings.number("cutting_rate", default=0.0) > 0.0 and own & binding_key(
+                    hand.settings.number("binding_key", ("binding", 2))
+                ):
+                    return hand
+    return None
+
+
+def binding_key(number):
+    """The bits of a key, all of them if it is not given."""
+    return _EVERY_KEY if number is None or not 0 <= number < 2**63 else int(number)
+
+
+def _of_still(translation, fiber, cutting):
+    # Fibers that do nothing but be cut.
+    if cutting is None:
+        return None
+    growing = Growing(fiber.name, fiber.settings, _usual_monomer(fiber.settings))
+    for end in _ENDS:
+        _cap(growing, end)
+    _add_cutting(translation, growing, cutting)
+    return growing
+
+
+def _add_cutting(translation, growing, cutting):
+    growing.entries.append(("severing_rate", "0 1/(um*s)", Note(EXACT, "hands alone cut it")))
+    settings = cutting.settings
+    plus, minus = (_STATES.get(settings.text(("new_end_state", own), default="white"), _STILL) for own in (0, 1))
+    line, keys = settings.line_of("new_end_state"), [key for key, *_ in growing.entries]
+    turns = "catastrophe_rate" in keys or "hydrolysis_rate" in keys
+    if turns and plus == _SHRINKING:
+        growing.entries.append(("severed_ends_shrink", True, Note(EXACT, "new_end_state", line)))
+    said = plus == (_STILL if "plus_capped" in keys else _GROWING) or (turns and plus == _SHRINKING)
+    if not said or minus != (_STILL if "minus_capped" in keys else _GROWING):
+        translation.left_out("new_end_state: new ends are as those of other filaments", line, _NEW_ENDS)
 
 
 def _rate(growing, end, on, off):
@@ -126,49 +184,96 @@ def _grow(translation, growing, states):
 
 
 def _turning(translation, growing, states, key):
-    # The plus end grows and shrinks in turn, the minus end does one of them.
+    # Ends that grow and shrink in turn, or do one of them.
+    for end in _ENDS:
+        settings = growing.settings
+        turns = _turning_rate(growing, key, end) > 0.0
+        rescued = settings.number(("rescue_rate", _ENDS.index(end)), default=0.0) > 0.0
+        grows, shrinks = (states[end] == own for own in (_GROWING, _SHRINKING))
+        if end == "minus" and not (grows and turns) and not (shrinks and rescued):
+            _simple(translation, growing, states, end)
+        elif states[end] == _STILL:
+            _cap(growing, end)
+        else:
+            _turn(translation, growing, states[end], key, end)
+
+
+def _turn(translation, growing, state, key, end):
+    settings, index, prefix = growing.settings, _ENDS.index(end), "minus_" if end == "minus" else ""
+    on, off = _speed(growing, "growing_speed", end), -_speed(growing, "growing_off_speed", end)
+    shrinking = -settings.number(("shrinking_speed", index), default=0.0)
+    shrinking_off = Note(EXACT, f"{shrinking:g} um/s", settings.line_of("shrinking_speed"))
+    turning = _turning_rate(growing, key, end)
+    rates = {
+        key: (quantity(turning, "1/s"), Note(EXACT, "", settings.line_of(key))),
+        "rescue_rate": (
+            quantity(settings.number(("rescue_rate", index), default=0.0), "1/s"),
+            Note(EXACT, "", settings.line_of("rescue_rate")),
+        ),
+        "shrinking_off_rate": (quantity(shrinking / growing.monomer, "1/s"), shrinking_off),
+    }
+    _rate(growing, end, on, off)
+    growing.turns = max(growing.turns, turning)
+    if key == "catastrophe_rate":
+        rates |= _load_and_length(growing, end, on)
+    if state == _SHRINKING and key == "catastrophe_rate":
+        growing.entries.append((f"{end}_states", _from_shrinking(rates), Note(EXACT, "it begins by shrinking")))
+        return
+    if state == _SHRINKING:
+        text = f"{growing.name}: the {end} end begins to shrink, and grows at first here"
+        translation.left_out(text, settings.line, "growth: ends that begin by shrinking")
+    growing.entries += [(prefix + name, *own) for name, own in rates.items()]
+
+
+def _has_old_rates(settings):
+    # Whether the second catastrophe_rate is that of a stalled plus end, as before 2014.
+    return len(settings.values("growing_force")) == 1
+
+
+def _turning_rate(growing, key, end):
     settings = growing.settings
-    if states["plus"] == _STILL:
-        _cap(growing, "plus")
-    else:
-        if states["plus"] == _SHRINKING:
-            translation.left_out(
-                f"{growing.name}: the plus end begins to shrink, and grows at first here",
-                settings.line,
-                "growth: ends that begin by shrinking",
-            )
-        on, off = _speed(growing, "growing_speed", "plus"), _speed(growing, "growing_off_speed", "plus")
-        _rate(growing, "plus", on, -off)
-        rate = settings.number(key, default=0.0)
-        growing.entries.append((key, quantity(rate, "1/s"), Note(EXACT, "", settings.line_of(key))))
-        growing.turns = rate
-        rescue = settings.number("rescue_rate", default=0.0)
-        growing.entries.append(("rescue_rate", quantity(rescue, "1/s"), Note(EXACT, "", settings.line)))
-        shrinking = -settings.number("shrinking_speed", default=0.0)
-        note = Note(EXACT, f"{shrinking:g} um/s", settings.line_of("shrinking_speed"))
-        growing.entries.append(("shrinking_off_rate", quantity(shrinking / growing.monomer, "1/s"), note))
-    if states["minus"] == _GROWING and settings.number((key, 1), default=0.0) > 0.0:
-        translation.left_out(
-            f"{growing.name}: catastrophes of the minus end", settings.line_of(key), "growth: minus ends that turn"
-        )
-    if states["minus"] == _SHRINKING and settings.number(("rescue_rate", 1), default=0.0) > 0.0:
-        translation.left_out(f"{growing.name}: rescues of the minus end", settings.line, "growth: minus ends that turn")
-    _simple(translation, growing, states, "minus")
+    if end == "minus" and key == "catastrophe_rate" and _has_old_rates(settings):
+        return 0.0
+    return settings.number((key, _ENDS.index(end)), default=0.0)
+
+
+def _from_shrinking(rates):
+    # The two states of such an end, the second one first.
+    values = {name: value for name, (value, _) in rates.items()}
+    growing = {"name": "growing", "switch_rates": {"shrinking": values["catastrophe_rate"]}}
+    if "blocked_catastrophe_rate" in values:
+        more = float(values["blocked_catastrophe_rate"].split()[0]) - float(values["catastrophe_rate"].split()[0])
+        growing["blocked_switch_rates"] = {"shrinking": quantity(more, "1/s")}
+    if "catastrophe_length" in values:
+        growing["switch_length"] = values["catastrophe_length"]
+    shrinking = {"name": "shrinking", "on_rate": "0 1/(uM*s)", "off_rate": values["shrinking_off_rate"]}
+    return [shrinking | {"switch_rates": {"growing": values["rescue_rate"]}}, growing]
+
+
+def _load_and_length(growing, end, on):
+    # How catastrophes depend on what is in the way of an end, and on the length of its fiber.
+    settings, index, own = growing.settings, _ENDS.index(end), {}
+    free = _turning_rate(growing, "catastrophe_rate", end)
+    stalled = settings.number(("catastrophe_rate_stalled", index), default=0.0)
+    if end == "plus" and _has_old_rates(settings):
+        stalled = settings.number(("catastrophe_rate", 1), default=0.0) or stalled
+    # More catastrophes than monomers that could come have no meaning here.
+    most = on / growing.monomer if free > 0.0 else 0.0
+    if free < stalled:
+        blocked = min(stalled, free + most)
+        text = "linear in the share of monomers that come, where Cytosim's 1/rate is"
+        if blocked < stalled:
+            text += f"; {stalled:g} 1/s there, more than monomers that come"
+        note = Note(NEAREST, text, settings.line_of("catastrophe_rate_stalled"))
+        if blocked > free:
+            own["blocked_catastrophe_rate"] = (quantity(blocked, "1/s"), note)
+    length = settings.number("catastrophe_length", default=0.0)
+    if end == "plus" and length > 0.0:
+        own["catastrophe_length"] = (quantity(length, "um"), Note(EXACT, "", settings.line_of("catastrophe_length")))
+    return own
 
 
 def _classic(translation, growing, states):
-    settings = growing.settings
-    stalled = settings.number("catastrophe_rate_stalled", default=0.0)
-    if stalled == 0.0 and settings.number(("catastrophe_rate", 1), default=0.0) > 0.0:
-        # As Cytosim before 2018 had it, and reads it where the minus end does nothing.
-        if states["minus"] == _STILL:
-            stalled = settings.number(("catastrophe_rate", 1))
-    if stalled > 0.0:
-        translation.left_out(
-            f"{growing.name}: the catastrophe rate of a stalled end, {stalled:g} 1/s: it is that of a free end always",
-            settings.line_of("catastrophe_rate"),
-            "growth: catastrophes that depend on load",
-        )
     _turning(translation, growing, states, "catastrophe_rate")
     growing.entries.append(("deterministic", True, Note(EXACT, "lengths change at constant speeds")))
 
@@ -191,7 +296,7 @@ def _add_ends(translation, growing, activity, rebirth):
         growing.entries.append(("growing_force", quantity(_NO_FORCE, "pN"), note))
     stub = settings.number("delete_stub")
     persistent = settings.flag("persistent", default=stub == 0.0 if stub is not None else False)
-    shrinks = any(key.endswith("off_rate") for key, *_ in (*growing.rates, *growing.entries))
+    shrinks = any(key.endswith(("off_rate", "_states")) for key, *_ in (*growing.rates, *growing.entries))
     if shrinks and not persistent:
         note = Note(EXACT, "one of the shortest length is deleted (persistent = 0)", settings.line)
         growing.entries.append(("vanishes", True, note))

@@ -3,13 +3,16 @@
 import math
 
 from .document import EXACT, LEFT_OUT, NEAREST, Note, quantity
+from .growth import binding_key
 from .settings import OFF
 
 _PLAIN, _MOTORS, _ON_SITES = ("bind", "none", ""), ("move", "motor"), ("walk", "digit")
 _NEAR_ENDS = "hands near ends"
-_OF_ACTIVITY = {"slide": "hands that slip along filaments", "track": _NEAR_ENDS}
+_OF_ACTIVITY = {"slide": "hands that slip along filaments"}
+_ENDS = {"plus_end": "plus", "minus_end": "minus"}
+_AT_END = "8 nm"
+"""How near to an end a motor counts as there."""
 _LEAST_REACH = 0.001
-_EVERY_KEY = 2**32 - 1
 
 
 class HandRead:
@@ -28,8 +31,9 @@ class HandRead:
 
     @property
     def stays(self):
-        """Whether it never unbinds and never walks: what it joins is joined forever."""
-        return self.table["unbinding_rate"].startswith("0 ") and "speed" not in self.table
+        """Whether it never unbinds, walks or follows an end: what it joins is joined forever."""
+        moves = {"speed", "filament_end", "severing_rate"} & set(self.table)
+        return self.table["unbinding_rate"].startswith("0 ") and not moves
 
     @property
     def reach(self):
@@ -58,7 +62,10 @@ def read_hand(translation, name, line):
 
 def _read_activity(hand, settings):
     activity = settings.text("activity", default="bind")
-    if activity in _PLAIN:
+    if activity in (*_PLAIN, "track"):
+        return
+    if activity == "cut":
+        _read_cutting(hand, settings)
         return
     if activity not in (*_MOTORS, *_ON_SITES):
         needs = _OF_ACTIVITY.get(activity, f"hands: {activity}")
@@ -83,29 +90,91 @@ def _read_activity(hand, settings):
         hand.note(NEAREST, "it walks backward at most as fast as forward", settings.line_of("limit_speed"))
 
 
+def _read_cutting(hand, settings):
+    rate = settings.number("cutting_rate", default=0.0)
+    settings.values("new_end_state")
+    if rate > 0.0:
+        hand.set("severing_rate", rate, "1/s")
+        hand.note(NEAREST, "it cuts, and stays on one of both parts; in Cytosim it lets go", settings.line)
+
+
 def _read_ends(translation, hand, settings):
-    if settings.text("bind_only_end", "bind_end") not in OFF:
-        settings.values("bind_end_range")
-        settings.values("bind_only_free_end")
-        hand.note(LEFT_OUT, "bind_only_end", settings.line_of("bind_only_end"), _NEAR_ENDS)
+    tracks = settings.text("activity") == "track"
+    end = settings.text("bind_only_end", "bind_end", default="off")
+    tracked = settings.text("track_end", default=end) if tracks else "off"
     if settings.text("bind_also_end", "bind_also_ends") not in OFF:
         hand.note(EXACT, "it binds at ends as well, as all of ours do", settings.line_of("bind_also_end"))
+    if end not in OFF or tracks:
+        _bind_near(translation, hand, settings, end, tracked)
     forward = not hand.table.get("speed", "0").startswith("-")
     holds = settings.number(("hold_growing_end", 0 if forward else 1), "hold_growing_ends", default=0.0)
     if "speed" in hand.table and holds > 0.0:
         hand.table["at_end"] = "hold"
         if holds < 1.0:
-            hand.note(LEFT_OUT, f"a chance of {holds:g} to stay at an end", settings.line, _NEAR_ENDS)
-    shrinking = [settings.number(("hold_shrinking_end", own), default=0.0) for own in (0, 1)]
-    if any(shrinking) and translation.growings:
-        hand.note(LEFT_OUT, "hold_shrinking_end", settings.line_of("hold_shrinking_end"), _NEAR_ENDS)
+            _hold_at_times(translation, hand, settings, holds)
+    _hold_shrinking(translation, hand, settings, forward)
+
+
+def _bind_near(translation, hand, settings, end, tracked):
+    reach = settings.number("bind_end_range", ("bind_only_end", 1), ("bind_end", 1), default=0.0)
+    line = settings.line_of("bind_only_end")
+    known = end in _ENDS and tracked in ("off", end) and _grows(translation, settings)
+    if not known or settings.flag("bind_only_free_end", default=False):
+        hand.note(LEFT_OUT, f"bind_only_end = {end}", line, _NEAR_ENDS)
+        return
+    hand.table["filament_end"] = {
+        "end": _ENDS[end],
+        "range": quantity(max(reach, _LEAST_REACH), "um"),
+        "binds_there": True,
+        "tracks": tracked != "off",
+    }
+    kind = EXACT if tracked != "off" else NEAREST
+    hand.note(kind, "bind_only_end; it is at the end itself as soon as it binds, where that is within its reach", line)
+
+
+def _grows(translation, settings):
+    # Whether there is a fiber that it binds to whose ends come and go.
+    own = binding_key(settings.number("binding_key", ("binding", 2)))
+    grow = {made.name for made in translation.made if made.grows} | set(translation.nucleated)
+    return any(own & binding_key(translation.script.properties[name].settings.number("binding_key")) for name in grow)
+
+
+def _hold_at_times(translation, hand, settings, holds):
+    # Cytosim draws for it once in each step of a motor, or of time.
+    attempts = 1.0 / translation.script.time_step
+    if "site_spacing" in hand.table:
+        attempts = abs(_number(hand.table["speed"])) / _number(hand.table["site_spacing"])
+    text = f"a chance of {holds:g} to stay at an end"
+    if attempts * (1.0 - holds) <= _number(hand.table["unbinding_rate"]):
+        hand.note(
+            NEAREST, f"{text}, from which it unbinds more often than at its rate: at its rate here", settings.line
+        )
+    else:
+        hand.note(LEFT_OUT, f"{text}: it stays", settings.line, _NEAR_ENDS)
+
+
+def _hold_shrinking(translation, hand, settings, forward):
+    chances = [settings.number(("hold_shrinking_end", own), default=0.0) for own in (0, 1)]
+    if not any(chances) or not _grows(translation, settings) or "filament_end" in hand.table:
+        return
+    line, walked_to = settings.line_of("hold_shrinking_end"), 0 if forward else 1
+    if chances[walked_to] == 1.0 and chances[1 - walked_to] == 0.0 and hand.table.get("at_end") == "hold":
+        end = ("plus", "minus")[walked_to]
+        hand.table["filament_end"] = {"end": end, "range": _AT_END, "tracks": True}
+        hand.note(NEAREST, "hold_shrinking_end: it stays at the end that it has walked to", line)
+    else:
+        hand.note(LEFT_OUT, "hold_shrinking_end", line, _NEAR_ENDS)
+
+
+def _number(text):
+    return float(text.split()[0])
 
 
 def _read_keys(translation, hand, settings):
-    own = _key(settings.number("binding_key", ("binding", 2)))
+    own = binding_key(settings.number("binding_key", ("binding", 2)))
     matching, every = [], True
     for fiber in translation.fibers_made():
-        if own & _key(fiber.settings.number("binding_key")):
+        if own & binding_key(fiber.settings.number("binding_key")):
             matching.append(translation.type_name(fiber.name))
         else:
             every = False
@@ -113,7 +182,3 @@ def _read_keys(translation, hand, settings):
     if matching and not every:
         hand.table["binds_to"] = matching
         hand.note(EXACT, "binding_key", settings.line_of("binding_key"))
-
-
-def _key(number):
-    return _EVERY_KEY if number is None or not 0 <= number < 2**63 else int(number)

@@ -208,11 +208,11 @@ def _points(translation, new, count, before):
         count = _MOST_ANCHORS - before
     options = new.settings
     text = options.text("position", default="inside")
-    word = unknown_position(text)
+    space = translation.space(options.text(("position", 1)))
+    word = unknown_position(text, space)
     if word is not None:
         translation.left_out(f"{count} {new.name} at {text!r}", options.line_of("position"), f"positions: {word}")
         return []
-    space = translation.space(options.text(("position", 1)))
     draw = translation.draw_in(space, new.line)
     keep, places = options.text("placement", default="inside") == "inside", []
     first, last = (options.vector("range", own) for own in (0, 1))

@@ -46,6 +46,13 @@ class Draw:
             if length > 1e-9:
                 return vector / length
 
+    @property
+    def radius(self):
+        """That of the space, if it is a sphere."""
+        if self.space is None or self.space.shape != "sphere":
+            raise self.mistake("places on the surface of a space that is no sphere are not known here.")
+        return float(self.space.half[0])
+
     def ball(self, dimensions=None):
         """A random point of the unit ball."""
         count = dimensions or self.dimensions
@@ -199,6 +206,17 @@ def _gradient(x, first, last):
     return share if 0.0 <= share <= 1.0 else 0.0
 
 
+def _surface(draw, numbers, _):
+    return draw.radius * draw.unit()
+
+
+def _edge(draw, numbers, _):
+    # Within a distance of the surface.
+    radius, depth = draw.radius, (*numbers, 1.0)[0]
+    least = (1.0 - min(1.0, depth / radius)) ** draw.dimensions
+    return radius * draw.generator.uniform(least, 1.0) ** (1.0 / draw.dimensions) * draw.unit()
+
+
 def _flat(draw, vector):
     if draw.dimensions == 2:
         vector[2] = 0.0
@@ -223,18 +241,21 @@ _PRIMITIVES = {
     "sphere": _shell,
     "square": _square,
     "stripe": _stripe,
+    "surface": _surface,
+    "edge": _edge,
     "XY": _within_plane,
     "XZ": _within_plane,
     "YZ": _within_plane,
     "gradient": _along_x(_gradient),
     "exponential": _along_x(lambda x, first, scale: math.exp((first - x) / scale) if x >= first else 0.0),
 }
+_ON_SPHERES = ("surface", "edge")
 _WITH_AXIS = {"cylinder": "X", "disc": "Z", "circle": "Z", "ring": "X"}
 _NEED_NUMBER = {"ball", "cylinder", "disc", "circle", "sphere", "arc", "line", "rectangle", "ring", "ellipse"}
 
 
-def unknown_position(text):
-    """The word of a position that is not known here, or None."""
+def unknown_position(text, space):
+    """The word of a position in a Space or none that is not known here, or None."""
     words = _Words(text)
     if words.numbers() and not words.word:
         return None
@@ -244,6 +265,8 @@ def unknown_position(text):
             words.numbers()
             continue
         if _named(word)[0] not in _PRIMITIVES:
+            return word
+        if word in _ON_SPHERES and (space is None or space.shape != "sphere"):
             return word
         words.numbers()
     return None

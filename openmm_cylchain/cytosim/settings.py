@@ -47,6 +47,10 @@ class Settings:
     def __contains__(self, key):
         return key in self._values
 
+    def peek(self, key):
+        """The first value of a key, or None; it does not count as asked for."""
+        return next(iter(self._values.get(key, [])), None)
+
     def values(self, key):
         """All values of a key; none if it is not there."""
         self._used.add(key)

@@ -11,6 +11,9 @@ _BOLTZMANN = 1.380649e-5
 _COLDEST = 1e-3
 _USUAL_FRAMES = 100
 _MOST_STEPS_PER_FRAME = 10**7
+_STILL = 1e8
+"""In pN s/um^2: a viscosity in which fibers stand still."""
+_NOT_SOLVED = ("off", "0")
 _CONFINED = ("inside", "all_inside", "1")
 
 
@@ -34,8 +37,12 @@ def add_solvent(translation):
         table.add("temperature", quantity(temperature, "K"), Note(EXACT, f"kT = {energy:g} pN um", simul.line_of("kT")))
     if not 0.0 < translation.viscosity < math.inf:
         raise simul.mistake("viscosity", "must be positive.")
-    viscosity = quantity(translation.viscosity, "pN*s/um^2")
-    table.add("viscosity", viscosity, Note(EXACT, "that is Pa s", simul.line_of("viscosity")))
+    viscosity, note = translation.viscosity, Note(EXACT, "that is Pa s", simul.line_of("viscosity"))
+    run = translation.script.run
+    if run is not None and run.text("solve", default="on") in _NOT_SOLVED:
+        note = Note(NEAREST, f"solve = off: fibers stand still in it, and not in {viscosity:g}", run.line_of("solve"))
+        viscosity = max(viscosity, _STILL)
+    table.add("viscosity", quantity(viscosity, "pN*s/um^2"), note)
     flow = simul.vector("flow")
     if flow is not None and any(flow):
         table = translation.document.table("[flow]", simul.line_of("flow"))
@@ -191,8 +198,5 @@ def _read_run(translation, run):
     for key in ("nb_steps", "duration", "time", "nb_frames"):
         run.values(key)
     mode = run.text("solve", default="on")
-    if mode in ("off", "0"):
-        text = "solve = off, with which fibers stand still: here they move"
-        translation.document.note(LEFT_OUT, text, run.line_of("solve"), "filaments that stand still")
-    elif mode not in ("on", "auto", "1"):
+    if mode not in (*_NOT_SOLVED, "on", "auto", "1"):
         translation.left_out(f"solve = {mode}", run.line_of("solve"), f"solve = {mode}")

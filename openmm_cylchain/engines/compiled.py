@@ -109,6 +109,8 @@ class CompiledEngine(Engine):
             force.setChainName(number, filament_label(number, filament))
         for tether in placed.tethers:
             force.addTether(tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
+        for body, particles in zip(placed.bodies, placed.body_indices):
+            _add_body(force, body, particles, placed.viscosity)
         system.addForce(force)
         box = None
         if placed.periodic:
@@ -137,8 +139,6 @@ class CompiledEngine(Engine):
         )
         for particle, friction in zip(others, frictions):
             integrator.setParticleFriction(int(particle), float(friction))
-        for placed_body, particles in zip(placed.bodies, placed.body_indices):
-            _add_body(integrator, placed_body, particles, placed.viscosity)
         linkers = find_binding_force(system)
         if linkers is not None:
             linkers.setTemperature(settings.temperature)
@@ -243,13 +243,13 @@ def _add_chain(force, filament, nodes, viscosity, temperature):
         force.setJointParameters(chain, joint, float(stiffness))
 
 
-def _add_body(integrator, placed, particles, viscosity):
+def _add_body(force, placed, particles, viscosity):
     body, turn = placed.body, np.eye(3)
     if placed.planar:
         # In a frame that is not tilted, it turns about z.
         turn = placed.rotation
     rotational = turn @ body.rotational_friction(viscosity) @ turn.T
-    integrator.addBody(
+    force.addBody(
         [int(particle) for particle in particles],
         ((body.points - body.centre) @ turn.T).ravel().tolist(),
         body.friction(viscosity),

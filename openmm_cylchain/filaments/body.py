@@ -54,6 +54,7 @@ class Body:
     points: FloatArray
     radii: FloatArray
     name: str = "Body"
+    _markers: int = 0
 
     def __init__(self, points: Vectors, radii: Numbers, name: str = "Body") -> None:
         if not isinstance(name, str) or not name:
@@ -75,6 +76,7 @@ class Body:
         object.__setattr__(self, "points", np.concatenate([places, markers]))
         object.__setattr__(self, "radii", np.concatenate([sizes, np.zeros(len(markers))]))
         object.__setattr__(self, "name", name)
+        object.__setattr__(self, "_markers", len(markers))
         self.points.flags.writeable = self.radii.flags.writeable = False
 
     @classmethod
@@ -91,6 +93,12 @@ class Body:
         size = positive(radius, LENGTH, f"{name}: radius")
         places = np.asarray(in_units_of(points, LENGTH, f"{name}: points"), dtype=float).reshape(-1, 3)
         return cls(np.concatenate([np.zeros((1, 3)), places]), np.r_[size, np.zeros(len(places))], name)
+
+    @property
+    def has_places(self) -> bool:
+        """Whether it has points off its centre, beside those that only tell how it is turned."""
+        given = self.points[: len(self.points) - self._markers]
+        return bool(np.any(np.linalg.norm(given - self.centre, axis=1) > _ON_LINE * self.radii.max()))
 
     @property
     def centre(self) -> FloatArray:

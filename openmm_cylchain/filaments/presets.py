@@ -112,10 +112,12 @@ MDIA1_ENDS = EndStates(
 )
 """Plus ends of ATP-actin, free and with the formin mDia1, without profilin: for a ``HandAtEnd`` that changes them.
 
-Free ones are those of ACTIN_ATP. With mDia1 (its domains FH1 and FH2) they grow 0.9 times as fast, its gating factor
-(Kovar, Harris, Mahaffy, Higgs, Pollard, Cell 2006, 124, 423). That k_off has the same factor is no measurement: a
-formin that stays at the end while monomers come and go leaves the concentration as it is at which the end stands still.
-Other formins slow ends down more; profilin speeds them up.
+Free ones are those of ACTIN_ATP. With mDia1 (its domains FH1 and FH2) they grow 0.9 times as fast, its gating factor.
+That number is the usual one, whose source is Kovar, Harris, Mahaffy, Higgs and Pollard, Control of the assembly of ATP-
+and ADP-actin by formins and profilin, Cell 2006, 124, 423 (doi:10.1016/j.cell.2005.11.038); it was not compared with
+the tables of that paper. That k_off has the same factor is no measurement: a formin that stays at the end while
+monomers come and go leaves the concentration as it is at which the end stands still. Other formins slow ends down more;
+profilin speeds them up.
 """
 
 TUBULIN = Monomers(

@@ -123,7 +123,8 @@ class Filaments(TiedFilaments):
         """Put the filaments into an existing Topology and System, behind what is there.
 
         One filament becomes one chain of the Topology, with a residue and an atom (named "NOD") for each
-        node and bonds along it. Rigid bodies come behind them, each a chain with an atom (named "BOD") for each point. Everything that was in the Topology and the System stays as it is.
+        node and bonds along it. Rigid bodies come behind them, each a chain with an atom (named "BOD") for each
+        point. Everything that was in the Topology and the System stays as it is.
 
         Parameters
         ----------

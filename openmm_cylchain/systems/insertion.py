@@ -92,8 +92,10 @@ _BODY_MASS = 1.0
 
 
 def add_body_to_system(system: openmm.System, topology: "app.Topology", placed: PlacedBody, name: str) -> IntArray:
-    """Add a rigid body to a System, and to a Topology as a chain of a residue and an atom for each point: the indices of
-    its particles."""
+    """Add a rigid body to a System, and to a Topology as a chain of a residue and an atom for each point.
+
+    Returns the indices of its particles.
+    """
     chain = topology.addChain(name)
     particles = []
     for number in range(len(placed.positions)):

@@ -11,6 +11,7 @@ from ..filaments.attachments import BEAD_NAME
 from ..filaments.collection import FilamentCollection
 from ..mechanics.flow import Flow
 from ..units.types import FloatArray, Numbers, Scalar
+from .body_step import steps_of_bodies
 from .buckling_step import steps_of_buckling
 from .coupled_forces import CoupledForces
 from .coupled_step import steps_of_couplings, steps_of_linked_contacts
@@ -43,6 +44,7 @@ def recommended_step_of(
         steps.append(_step_of_contacts(filaments, contact_diameter, contact_stiffness, confidence))
     elif contact_stiffness is not None:
         raise InputError("A contact_stiffness needs a contact_diameter.")
+    steps += steps_of_bodies(filaments, temperature)
     constant_forces: dict[int, FloatArray] = {}
     if system is not None:
         coupled = CoupledForces(system)

@@ -368,7 +368,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %pythonappend OpenMM::CylinderChainIntegrator::getFriction() const %{
     val = unit.Quantity(val, 1/unit.picosecond)
 %}
-%pythonappend OpenMM::CylinderChainIntegrator::getBody(int, std::vector<int>&, std::vector<double>&, double&,
+%pythonappend OpenMM::CylinderChainForce::getBody(int, std::vector<int>&, std::vector<double>&, double&,
         std::vector<double>&, bool&) const %{
     units = (unit.dimensionless, _LENGTH, _FRICTION, _FRICTION*_LENGTH**2, unit.dimensionless)
     val = [v if u == unit.dimensionless else unit.Quantity(v, u) for v, u in zip(val, units)]
@@ -453,7 +453,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %ignore OpenMM::CylinderChainForce::getChains;
 %ignore OpenMM::CylinderChainForce::describeChains;
 %ignore OpenMM::CylinderChainContactForce::getBodies;
-%ignore OpenMM::CylinderChainIntegrator::getBodies;
+%ignore OpenMM::CylinderChainForce::getBodies;
 %ignore OpenMM::CylinderChainWallForce::getWalls;
 %ignore OpenMM::CylinderChainBindingForce::getState;
 %ignore OpenMM::CylinderChainBindingForce::getHand;

@@ -6,34 +6,15 @@ import numpy as np
 import pytest
 from openmm import unit
 
-from openmm_cylchain.cytosim.command import check, import_file
+from openmm_cylchain.cytosim.command import check
 from openmm_cylchain.cytosim.places import Draw, draw_direction, draw_inside, draw_position
 from openmm_cylchain.cytosim.settings import Settings
 from openmm_cylchain.cytosim.spaces import make_space
 from openmm_cylchain.cytosim.translation import translate
 from openmm_cylchain.errors import InputError
 from openmm_cylchain.filaments.end_states import DynamicInstability, TwoUnitCap
-from openmm_cylchain.runs.configuration import read_configuration
 from openmm_cylchain.units.quantities import BENDING_RIGIDITY, FORCE, STIFFNESS, VISCOSITY
-
-SYSTEM = "set simul system { time_step = 0.001; viscosity = 0.5; kT = 0.0042; dim = 3 }\n"
-CELL = "set space cell { shape = sphere }\nnew cell { radius = 4 }\n"
-TUBE = "set fiber tube { rigidity = 20; segmentation = 0.5 }\n"
-RUN = "run 1000 system { nb_frames = 10 }\n"
-SECOND, MICROMETER = 1e12, 1e3
-
-
-def translated(tmp_path, text, system=SYSTEM, cell=CELL, run=RUN, **options):
-    """The Configuration and the Document of a text after a system and a cell, before a run."""
-    path, output = tmp_path / "my.cym", tmp_path / "my.toml"
-    path.write_text(system + cell + text + run)
-    output.unlink(missing_ok=True)
-    for start in tmp_path.glob("*.npy"):
-        start.unlink()
-    import_file(path, output, **options)
-    document = translate(path, "my", options.get("dimensions")).document
-    assert output.read_text() == document.text()
-    return read_configuration(output), document
+from support.cytosim_files import CELL, MICROMETER, RUN, SECOND, SYSTEM, TUBE, translated
 
 
 def test_solvent_and_run(tmp_path):
@@ -309,13 +290,7 @@ def test_fibers_share_a_pool_of_polymer(tmp_path):
 @pytest.mark.parametrize(
     ("keys", "state", "missing"),
     [
-        (
-            "activity = classic; catastrophe_rate = 0.1; catastrophe_rate_stalled = 1",
-            "plus_end = grow",
-            "depend on load",
-        ),
-        ("activity = classic; catastrophe_rate = 0.1", "plus_end = shrink", "begin by shrinking"),
-        ("activity = classic; catastrophe_rate = 0.1, 0.1", "end_state = grow, grow", "minus ends that turn"),
+        ("activity = dynamic; hydrolysis_rate = 0.1", "plus_end = shrink", "begin by shrinking"),
         ("activity = classic; persistent = 1; rebirth_rate = 1", "plus_end = grow", "rebirth"),
         ("activity = vector_growth", "plus_end = grow", "growth: vector_growth"),
     ],
@@ -324,6 +299,73 @@ def test_what_ends_cannot_do_here_is_said(tmp_path, keys, state, missing):
     own = f"set fiber tube {{ rigidity = 20; growing_speed = 0.5; shrinking_speed = -1; {keys} }}\n"
     _, document = translated(tmp_path, own + f"new 3 tube {{ length = 2; {state} }}\n")
     assert len(document.missing) == 1 and missing in document.missing[0]
+
+
+def test_filaments_are_held_at_places(tmp_path):
+    text = "set hand glue { binding = 10, 0.05; unbinding = 0, inf }\n"
+    text += "set single clamp { hand = glue; stiffness = 100; activity = fixed }\n" + TUBE
+    text += "new 2 tube { length = 3; direction = 1 0 0; attach1 = clamp, 1; attach2 = clamp, 0.6, plus_end; "
+    text += "attach3 = clamp, 0, center,, 1 2 3; attach4 = clamp, 3 }\n"
+    found, document = translated(tmp_path, text)
+    # Nodes are 0.5 um apart.
+    assert [tether.node for tether in found.tethers] == [2, 5, 3, -1]
+    assert [tether.point for tether in found.tethers] == [None, None, (1000.0, 2000.0, 3000.0), None]
+    assert all(tether.filaments == (0, 1) for tether in found.tethers) and document.missing == []
+    assert [note.text for note in document.notes if "nearest one" in note.text] == [
+        "the nearest one, 0.1 um from there"
+    ]
+    found, _ = translated(tmp_path, text.replace("clamp, 1;", "clamp, 0;").replace("0.6, plus_end", "0.2"))
+    # Each node is held once.
+    assert [tether.node for tether in found.tethers] == [0, 1, 3, -1]
+    _, document = translated(tmp_path, text.replace("clamp, 3 ", "clamp, 4 "))
+    assert document.missing == ["linkers that begin bound at given places"]
+
+
+def test_forces_at_the_middle(tmp_path):
+    own = "set fiber tube { rigidity = 20; segmentation = 0.5; end_force = 0 2 0, center }\n"
+    found, document = translated(tmp_path, own + "new tube { length = 3 }\n")
+    assert found.pulls[0].node == 3 and document.missing == []
+    _, document = translated(tmp_path, own + "new tube { length = 2.5 }\n")
+    assert document.missing == ["forces on ends that grow, or on middles"]
+
+
+def test_fibers_that_stand_still(tmp_path):
+    """They diffuse by less than a nanometre in the whole run."""
+    found, document = translated(tmp_path, TUBE + "new tube { length = 3 }\n", run="run 1000 system { solve = 0 }\n")
+    group, solvent = found.filaments[0], found.solvent
+    friction = group.type.segment_friction(solvent.viscosity, solvent.temperature, group.segments).parallel
+    diffusion = 8.314462618e-3 * solvent.temperature / (friction * group.segments)
+    assert math.sqrt(6 * diffusion * found.simulation.steps * found.simulation.time_step) < 1.0
+    assert document.missing == []
+
+
+def settings_with(sizes):
+    settings = Settings("space", 1)
+    for part in sizes.split(";"):
+        key, _, values = part.partition("=")
+        settings.set(key.strip(), [own.strip() for own in values.split(",")], 1)
+    return settings
+
+
+@pytest.mark.parametrize(("dimensions", "shape"), [(2, "circle"), (3, "sphere")])
+def test_places_on_the_surface_of_a_sphere(tmp_path, dimensions, shape):
+    space = make_space(shape, [settings_with("radius = 4")], dimensions)
+    draw = Draw(space, dimensions, np.random.default_rng(3), 1)
+    found = np.array([draw_position("surface", draw) for _ in range(2000)])
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 4.0)
+    assert np.all(np.abs(found.mean(axis=0)) < 4 * 4 / np.sqrt(dimensions * 2000))
+    within = np.linalg.norm([draw_position("edge 1", draw) for _ in range(2000)], axis=1)
+    assert within.min() > 3.0 and within.max() < 4.0
+    # Evenly in the shell: so many are in its inner half.
+    share = (3.5**dimensions - 3**dimensions) / (4**dimensions - 3**dimensions)
+    assert abs(np.mean(within < 3.5) - share) < 4 * math.sqrt(share * (1 - share) / 2000)
+    text = HAND + "set single fixed_one { hand = motor; activity = fixed; stiffness = 10 }\n" + TUBE
+    text += "new tube { length = 2 }\nnew 20 fixed_one ( surface )\n"
+    _, document = translated(tmp_path, text)
+    assert document.missing == []
+    box = "set space cell { shape = square }\nnew cell { length = 9 9 9 }\n"
+    _, document = translated(tmp_path, text, cell=box.replace("9 9 9", "9, 9, 9"))
+    assert document.missing == ["positions: surface"]
 
 
 def test_static_ends_do_not_grow(tmp_path):
@@ -444,11 +486,7 @@ SHAPES = [
 
 @pytest.mark.parametrize(("shape", "sizes", "dimensions"), SHAPES)
 def test_volumes_of_spaces_are_those_of_what_is_inside(shape, sizes, dimensions):
-    settings = Settings("space", 1)
-    for part in sizes.split(";"):
-        key, _, values = part.partition("=")
-        settings.set(key.strip(), [own.strip() for own in values.split(",")], 1)
-    space = make_space(shape, [settings], dimensions)
+    space = make_space(shape, [settings_with(sizes)], dimensions)
     generator, count = np.random.default_rng(3), 200_000
     places = space.middle + space.half * generator.uniform(-1.2, 1.2, (count, 3))
     around = float(np.prod(2.4 * space.half[:dimensions]))

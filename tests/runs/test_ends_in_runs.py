@@ -74,6 +74,36 @@ def test_what_is_read_is_that_of_python():
     assert per_second([cap.hydrolysis_rate, cap.shrinking_off_rate]) == pytest.approx([0.4, 56.0])
 
 
+def test_catastrophes_of_blocked_ends_and_of_long_filaments_are_read():
+    more = ', blocked_catastrophe_rate = "4 1/s", catastrophe_length = "2 um"'
+    minus = "".join(f", minus_{one}" for one in (TURNING + more).split(", "))
+    growth = parse((TURNING + more).replace("2 um", "3 um") + minus).filaments[0].growth
+    for turning, length in ((growth.plus_instability, 3000.0), (growth.minus_instability, 2000.0)):
+        assert rates_of(turning) == pytest.approx([1.0, 1.0, 1.0])
+        assert turning.blocked_catastrophe_rate * 1e12 == pytest.approx(4.0)
+        assert turning.catastrophe_length == length
+    plain = parse(TURNING).filaments[0].growth.plus_instability
+    assert plain.blocked_catastrophe_rate is None and plain.catastrophe_length is None
+    own = parse(
+        'plus_states = [{ name = "a", switch_rates = { b = "2 1/s" }, blocked_switch_rates = { b = "3 1/s" } }, '
+        '{ name = "b", switch_rates = { a = "1 1/s" }, switch_length = "2 um" }]'
+    )
+    found = own.filaments[0].growth.states("plus")
+    np.testing.assert_allclose(per_second(found.switch_rates), [[0, 2], [1, 0]])
+    np.testing.assert_allclose(per_second(found.blocked_switch_rates), [[0, 3], [0, 0]])
+    assert found.switch_lengths == (0.0, 2000.0)
+
+
+def test_hands_that_cut_are_read():
+    cut = (f"{CAPPED}, plus_capped = true", "reserve = 4\n", HANDS, 'severing_rate = "0.2 1/s"\n')
+    with pytest.raises(InputError, match="two capped ends does not grow"):
+        parse(*cut)
+    configuration = parse(f'{cut[0]}, severing_rate = "0 1/(um*s)"', *cut[1:])
+    hand, other = configuration.linkers[0].kind.hands
+    assert hand == other and hand.severing_rate * 1e12 == pytest.approx(0.2)
+    assert configuration.filaments[0].growth.severing.rate == 0.0
+
+
 def test_a_preset_has_the_critical_concentration_of_free_ends():
     """With mDia1, an end grows nine tenths as fast, and stands still where a free one does."""
     own = parse('plus_states = "MDIA1_ENDS"').filaments[0].growth.states("plus")
@@ -139,6 +169,49 @@ CAPPED = "minus_capped = true"
             (),
             {},
         ),
+        (
+            "blocked_catastrophe_rate must not be below catastrophe_rate",
+            f'{TURNING}, blocked_catastrophe_rate = "0.5 1/s"',
+            (),
+            {},
+        ),
+        ("but only 58 monomers/s come to it", f'{TURNING}, blocked_catastrophe_rate = "100 1/s"', (), {}),
+        ("lacks the key 'catastrophe_rate': an end", 'catastrophe_length = "1 um"', (), {}),
+        ("catastrophe_length must be positive", f'{TURNING}, catastrophe_length = "0 um"', (), {}),
+        ("catastrophe_length has the unit", f'{TURNING}, catastrophe_length = "1 1/s"', (), {}),
+        (
+            "blocked_catastrophe_rate cannot be with hydrolysis_rate",
+            'hydrolysis_rate = "1 1/s", shrinking_off_rate = "1 1/s", blocked_catastrophe_rate = "1 1/s"',
+            (),
+            {},
+        ),
+        (
+            "minus_catastrophe_length cannot be with minus_hydrolysis_rate",
+            'minus_hydrolysis_rate = "1 1/s", minus_shrinking_off_rate = "1 1/s", minus_catastrophe_length = "1 um"',
+            (),
+            {},
+        ),
+        ("blocked_switch_rates is 'c', but", states('blocked_switch_rates = { c = "3 1/s" }'), (), {}),
+        ("blocked_switch_rates has 'a', which", states('blocked_switch_rates = { a = "3 1/s" }'), (), {}),
+        ("only 58 monomers/s come", states('blocked_switch_rates = { b = "60 1/s" }'), (), {}),
+        ("switch_length must be positive", states('switch_length = "-1 um"'), (), {}),
+        (
+            "no places for their parts: add to their table",
+            CAPPED,
+            (HANDS, 'severing_rate = "1 1/s"\n'),
+            {},
+        ),
+        (
+            "cuts filaments, but binds to none that grow",
+            CAPPED,
+            (
+                '[[filament]]\ntype = "MICROTUBULE"\nsegments = 3\n',
+                HANDS,
+                'binds_to = "MICROTUBULE"\nsevering_rate = "1 1/s"\n',
+            ),
+            {},
+        ),
+        ("severing_rate must be zero or positive", CAPPED, (HANDS, 'severing_rate = "-1 1/s"\n'), {}),
         ("lacks the key 'minus_shrinking_off_rate'", 'minus_hydrolysis_rate = "1 1/s"', (), {}),
         ("lacks the key 'minus_catastrophe_rate': an end", 'minus_rescue_rate = "1 1/s"', (), {}),
         ("hand filament_end lacks the key 'range'", FORMIN, (HANDS, 'filament_end = { end = "plus" }\n'), {}),
@@ -299,6 +372,17 @@ def test_shares_of_time_in_states(tmp_path):
     expected = {"open": 5 / 27.5, "shut": 20 / 27.5, "loose": 2.5 / 27.5, "growing": 0.75, "shrinking": 0.25}
     assert free == pytest.approx(expected)
     assert content[0]["rate_of_free_ends"] == pytest.approx(0.75 / 0.0275)
+
+
+def test_shares_that_depend_on_lengths_are_left_out(tmp_path):
+    text = HEAD + MONOMERS + FILAMENT + growth_of(TURNING + ', catastrophe_length = "1 um"') + TAIL
+    (tmp_path / "long.toml").write_text(text)
+    assert main(["run", str(tmp_path / "long.toml"), "--output", str(tmp_path / "out")]) == 0
+    (plus,) = (
+        own for own in json.loads((tmp_path / "out" / "summary.json").read_text())["growth"] if own["end"] == "plus"
+    )
+    assert plus["rate_of_free_ends"] is None
+    assert [own["share_of_free_ends"] for own in plus["states"]] == [None, None]
 
 
 def test_tethers_of_filaments_that_grow_can_move(tmp_path):

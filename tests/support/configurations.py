@@ -282,7 +282,7 @@ debranching_rate = "2 1/s"
 debranching_force = "50 pN"
 [[linkers]]
 type = "ALPHA_ACTININ"
-hand = { reach = "60 nm", binds_to = "ACT" }
+hand = { reach = "60 nm", binds_to = "ACT", severing_rate = "0.1 1/s" }
 count = 20
 volume = "4 um^3"
 [[wall]]
@@ -329,7 +329,7 @@ monomers = "ACTIN_ATP"
 longest = "1 um"
 minus_capped = true
 plus_states = [
-    { name = "free", switch_rates = { "in pause" = "60 1/s" } },
+    { name = "free", switch_rates = { "in pause" = "60 1/s" }, blocked_switch_rates = { "in pause" = "99 1/s" } },
     { name = "with formin", on_rate = "3 1/(uM*s)", off_rate = "0.4 1/s" },
     { name = "in pause", on_rate = "0 1/(uM*s)", off_rate = "0 1/s", switch_rates = { free = "30 1/s" } },
 ]
@@ -347,6 +347,7 @@ minus_catastrophe_rate = "10 1/s"
 minus_rescue_rate = "20 1/s"
 minus_shrinking_off_rate = "50 1/s"
 minus_shrinking_on_rate = "0.1 1/(uM*s)"
+minus_blocked_catastrophe_rate = "30 1/s"
 [[filament]]
 type = "MICROTUBULE"
 segment_length = "160 nm"

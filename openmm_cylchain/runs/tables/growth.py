@@ -15,7 +15,8 @@ PRESETS = {"MDIA1_ENDS": MDIA1_ENDS}
 """States of ends by the names that a configuration uses."""
 
 _INSTABILITY = ("catastrophe_rate", "rescue_rate", "shrinking_off_rate")
-_TURNING = ("catastrophe_rate", "hydrolysis_rate", "rescue_rate", "shrinking_off_rate", "shrinking_on_rate")
+_OF_CATASTROPHES = ("shrinking_on_rate", "blocked_catastrophe_rate", "catastrophe_length")
+_TURNING = (*_INSTABILITY, "hydrolysis_rate", *_OF_CATASTROPHES)
 _PREFIXES = {"minus": "minus_", "plus": ""}
 """Of what turns each end."""
 _OF_GROWTH = ("longest", "shortest", "plus_capped", "minus_capped", "deterministic", "growing_force", "vanishes")
@@ -34,6 +35,18 @@ _STATE = TableKind(
             Named(Quantity(units.RATE, "zero"), "rates by names of states", '{ growing = "0.2 1/s" }'),
             None,
             "At which it changes to other states by itself, by their names; to none if not given.",
+        ),
+        Key(
+            "blocked_switch_rates",
+            Named(Quantity(units.RATE, "zero"), "rates by names of states", '{ shrinking = "0.5 1/s" }'),
+            None,
+            "How much larger switch_rates are while growth is blocked; not at all if not given.",
+        ),
+        Key(
+            "switch_length",
+            Quantity(units.LENGTH),
+            None,
+            "Rates at which it changes are those of a filament of this length, and proportional to lengths, if given.",
         ),
         Key("after_gain", Text('"growing"'), None, "State after a monomer has come; as it is if not given."),
         Key("after_loss", Text('"paused"'), None, "State after a monomer has gone; as it is if not given."),
@@ -75,11 +88,26 @@ GROWTH = TableKind(
             None,
             "k_on while it shrinks, with catastrophe_rate; zero if not given.",
         ),
+        Key(
+            "blocked_catastrophe_rate",
+            _RATE,
+            None,
+            "catastrophe_rate of an end whose growth is blocked; between, the rate falls with the share of monomers "
+            "that come. As that of a free one if not given.",
+        ),
+        Key(
+            "catastrophe_length",
+            Quantity(units.LENGTH),
+            None,
+            "catastrophe_rate is that of a filament of this length, and proportional to lengths, if given.",
+        ),
         Key("minus_catastrophe_rate", _RATE, None, "At which the minus end begins to shrink; as that of the plus end."),
         Key("minus_hydrolysis_rate", _RATE, None, "In place of it, likewise."),
         Key("minus_rescue_rate", _RATE, None, "At which the minus end begins to grow again."),
         Key("minus_shrinking_off_rate", _RATE, None, "How many monomers the minus end loses while it shrinks."),
         Key("minus_shrinking_on_rate", Quantity(units.ON_RATE, "zero"), None, "k_on of the minus end, likewise."),
+        Key("minus_blocked_catastrophe_rate", _RATE, None, "That of a minus end whose growth is blocked, likewise."),
+        Key("minus_catastrophe_length", Quantity(units.LENGTH), None, "Of catastrophes of the minus end, likewise."),
         Key(
             "plus_states",
             Either(((list, _STATES), (object, Choice(tuple(PRESETS))))),
@@ -167,7 +195,7 @@ def _instability(entries, end, monomers):
             return PRESETS[entries[states]]
         return _states(entries[states], *(getattr(monomers, f"{end}_{which}_rate") for which in ("on", "off")))
     if "hydrolysis_rate" in given:
-        others = [prefix + name for name in ("catastrophe_rate", "shrinking_on_rate")]
+        others = [prefix + name for name in ("catastrophe_rate", *_OF_CATASTROPHES)]
         entries.refuse(others, f"cannot be with {prefix}hydrolysis_rate, which says when an end shrinks.")
         entries.require(prefix + "shrinking_off_rate")
         return TwoUnitCap(**given)
@@ -183,13 +211,6 @@ def _states(tables, on_rate, off_rate):
     for own, name in zip(tables, names):
         if names.count(name) > 1:
             raise own.at("name").error(f"is {name!r}, and so is another one: give each state a name of its own.")
-    switches = [[0.0] * len(names) for _ in names]
-    for number, own in enumerate(tables):
-        for name, rate in (own["switch_rates"] or {}).items():
-            other = _number_of(name, names, own.at("switch_rates"))
-            if other == number:
-                raise own.at("switch_rates").error(f"has {name!r}, which is the state itself: name others.")
-            switches[number][other] = rate
     after = {
         what: [
             _number_of(own[what], names, own.at(what)) if what in own else number for number, own in enumerate(tables)
@@ -199,10 +220,24 @@ def _states(tables, on_rate, off_rate):
     return EndStates(
         on_rates=[on_rate if own["on_rate"] is None else own["on_rate"] for own in tables],
         off_rates=[off_rate if own["off_rate"] is None else own["off_rate"] for own in tables],
-        switch_rates=switches,
+        switch_rates=_switches(tables, names, "switch_rates"),
+        blocked_switch_rates=_switches(tables, names, "blocked_switch_rates"),
+        switch_lengths=[own["switch_length"] or 0.0 for own in tables],
         names=names,
         **after,
     )
+
+
+def _switches(tables, names, key):
+    # Of each state to each.
+    switches = [[0.0] * len(names) for _ in names]
+    for number, own in enumerate(tables):
+        for name, rate in (own[key] or {}).items():
+            other = _number_of(name, names, own.at(key))
+            if other == number:
+                raise own.at(key).error(f"has {name!r}, which is the state itself: name others.")
+            switches[number][other] = rate
+    return switches
 
 
 def _number_of(name, names, place):

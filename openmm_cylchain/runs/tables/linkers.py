@@ -17,6 +17,7 @@ from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Flag, Inline, Key, Listing, Number, Pair, Quantity, Text, Whole, as_written, point
 from ..table import Entries, TableKind
 from .filament_types import PRESETS as FILAMENT_PRESETS
+from .nucleation import has_places
 from .shapes import volume_within
 from .solvent import EDGES
 
@@ -30,6 +31,12 @@ _QUANTITIES = {
     "speed": (units.VELOCITY, "any", "Speed of walking towards the last node; negative towards the first."),
     "stall_force": (units.FORCE, "positive", "Force at which a hand stands still."),
     "site_spacing": (units.LENGTH, "positive", "Distance of binding sites, each of which holds one hand."),
+    "severing_rate": (
+        units.RATE,
+        "zero",
+        "Rate at which it cuts the filament that it is bound to, which grows. Parts need places: reserve of "
+        "[[filament]].",
+    ),
 }
 
 
@@ -232,7 +239,24 @@ def read_linkers(entries, groups, box, seed, walls=(), bodies=()):
             bound = [own.growth for own in groups if own.growth is not None and hand.binds(own.type)]
             with entries.naming():
                 hand.filament_end.find_changes(bound)
+        if hand.severing_rate > 0.0:
+            _check_severing(entries, hand, groups)
     return group
+
+
+def _check_severing(entries, hand, groups):
+    cut = [own for own in groups if own.growth is not None and hand.binds(own.type)]
+    if not cut:
+        raise entries.error(
+            "A hand cuts filaments, but binds to none that grow: give them growth, in which both ends may be capped "
+            'if severing_rate = "0 1/(um*s)" is there.'
+        )
+    for group in cut:
+        if not has_places(group, groups):
+            raise entries.error(
+                f"A hand cuts filaments ({group.label}), and there are no places for their parts: add to their table a "
+                "line such as reserve = 100"
+            )
 
 
 def _volume(entries, shapes, box):

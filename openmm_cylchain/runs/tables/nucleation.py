@@ -211,12 +211,16 @@ def _mothers(entries, groups):
     return numbers
 
 
+def has_places(group, groups):
+    """Whether there are places for parts of the filaments of a group: any of the same type and growth."""
+    return any(own.is_reserve and own.growth is group.growth for own in groups)
+
+
 def check_places(tables, groups):
     """Raise ConfigurationError for a table whose filaments are cut, but have no places for their parts."""
     for group in groups:
         severing = None if group.growth is None else group.growth.severing
-        # Parts take any place of the same type and growth.
-        if severing is None or any(own.is_reserve and own.growth is group.growth for own in groups):
+        if severing is None or has_places(group, groups):
             continue
         name, index = group.path
         raise tables[name][index].error(

@@ -38,7 +38,7 @@ static void checkFixed(const cylchain::ChainList& chains) {
 }
 
 CylinderChainDescription::CylinderChainDescription(const System& system, const CylinderChainForce& force) :
-        chains(force.describeChains()), forceGroup(force.getForceGroup()),
+        chains(force.describeChains()), bodies(force.getBodies()), forceGroup(force.getForceGroup()),
         periodic(force.usesPeriodicBoundaryConditions()) {
     for (int number = 0; number < chains.size(); number++)
         chains.visit(number, [&] (auto& chain) {

@@ -2,6 +2,7 @@
 #include "openmm/OpenMMException.h"
 #include "openmm/internal/AssertionUtilities.h"
 #include "openmm/internal/CylinderChainForceImpl.h"
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <string>
@@ -308,6 +309,58 @@ void CylinderChainForce::checkTether(const TetherInfo& info) const {
             throw OpenMMException("CylinderChainForce: The point of a tether must be finite");
     if (!(info.tether.stiffness >= 0 && isfinite(info.tether.stiffness)))
         throw OpenMMException("CylinderChainForce: The stiffness of a tether cannot be negative and must be finite");
+}
+
+int CylinderChainForce::addBody(const vector<int>& particles, const vector<double>& places, double friction,
+        const vector<double>& rotationalFriction, bool planar) {
+    const string name = "Body "+to_string(bodies.size());
+    if (particles.size() < 3 || places.size() != 3*particles.size())
+        throw OpenMMException(name+" must have three particles or more, and three numbers for the place of each");
+    if (rotationalFriction.size() != 6)
+        throw OpenMMException(name+" must have six entries of its friction against turning, but has "+
+                to_string(rotationalFriction.size()));
+    for (int particle : particles) {
+        if (particle < 0)
+            throw OpenMMException("CylinderChainForce: Illegal particle index: "+to_string(particle));
+        if (count(particles.begin(), particles.end(), particle) > 1)
+            throw OpenMMException("Particle "+to_string(particle)+" is in "+name+" twice");
+        for (const cylchain::RigidBody& other : bodies)
+            if (find(other.particles.begin(), other.particles.end(), particle) != other.particles.end())
+                throw OpenMMException("Particle "+to_string(particle)+" is in another body than "+name+" already");
+    }
+    for (double number : places)
+        if (!isfinite(number))
+            throw OpenMMException(name+" has a place that is not finite");
+    if (!(friction > 0 && isfinite(friction)))
+        throw OpenMMException("The friction of "+name+" must be positive");
+    cylchain::RigidBody body;
+    body.particles = particles;
+    body.places = places;
+    body.friction = friction;
+    body.planar = planar;
+    copy(rotationalFriction.begin(), rotationalFriction.end(), body.rotationalFriction);
+    const double* const z = body.rotationalFriction;
+    const double minor = z[0]*z[3]-z[1]*z[1];
+    const double determinant = z[5]*minor-z[4]*(z[0]*z[4]-z[1]*z[2])+z[2]*(z[1]*z[4]-z[3]*z[2]);
+    if (!(z[0] > 0 && minor > 0 && determinant > 0 && isfinite(determinant)))
+        throw OpenMMException("The friction of "+name+" against turning must be positive definite");
+    if (cylchain::RigidFrameFinder(body).isOnLine())
+        throw OpenMMException("The particles of "+name+" must not all be on one line, which does not tell how it is "
+                "turned: add one beside it");
+    bodies.push_back(body);
+    return bodies.size()-1;
+}
+
+void CylinderChainForce::getBody(int index, vector<int>& particles, vector<double>& places, double& friction,
+        vector<double>& rotationalFriction, bool& planar) const {
+    if (index < 0 || index >= (int) bodies.size())
+        throw OpenMMException("CylinderChainForce: There is no body "+to_string(index));
+    const cylchain::RigidBody& body = bodies[index];
+    particles = body.particles;
+    places = body.places;
+    friction = body.friction;
+    rotationalFriction.assign(body.rotationalFriction, body.rotationalFriction+6);
+    planar = body.planar;
 }
 
 int CylinderChainForce::addTether(int chain, int node, const Vec3& point, double stiffness) {

@@ -33,7 +33,12 @@ void CylinderChainForceImpl::initialize(ContextImpl& context) {
 }
 
 void CylinderChainForceImpl::updateContextState(ContextImpl& context, bool&) {
-    if (planar == -1 || dynamic_cast<const CylinderChainIntegrator*>(&context.getIntegrator()) != NULL)
+    if (dynamic_cast<const CylinderChainIntegrator*>(&context.getIntegrator()) != NULL)
+        return;
+    if (owner.getNumBodies() > 0)
+        throw OpenMMException("CylinderChainForce: There are rigid bodies, which this Integrator would tear apart: use a "
+                "CylinderChainIntegrator");
+    if (planar == -1)
         return;
     throw OpenMMException("CylinderChainForce: "+description->getList().getName(planar)+" is planar, but this "
             "Integrator would take it out of its plane: use a CylinderChainIntegrator");

@@ -13,7 +13,7 @@ OtherParticles::OtherParticles(const System& system, const CylinderChainIntegrat
     for (const cylchain::Chain& chain : chains.getChains())
         for (int particle : chain.spareNodes)
             isNode[particle] = true;
-    bodies = integrator.getBodies();
+    bodies = chains.getBodies();
     ofBody.assign(numParticles, false);
     for (const cylchain::RigidBody& body : bodies)
         for (int particle : body.particles)

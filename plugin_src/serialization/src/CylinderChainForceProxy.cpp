@@ -57,6 +57,39 @@ static int addBeamChain(CylinderChainForce& force, const SerializationNode& node
     return chain;
 }
 
+static const char* const ROTATIONAL[] = {"xx", "xy", "xz", "yy", "yz", "zz"};
+
+static void writeBody(const CylinderChainForce& force, int index, SerializationNode& node) {
+    vector<int> particles;
+    vector<double> places, rotationalFriction;
+    double friction;
+    bool planar;
+    force.getBody(index, particles, places, friction, rotationalFriction, planar);
+    node.setDoubleProperty("friction", friction).setBoolProperty("planar", planar);
+    SerializationNode& rotational = node.createChildNode("RotationalFriction");
+    for (int i = 0; i < 6; i++)
+        rotational.setDoubleProperty(ROTATIONAL[i], rotationalFriction[i]);
+    for (size_t i = 0; i < particles.size(); i++)
+        node.createChildNode("Particle").setIntProperty("index", particles[i]).setDoubleProperty("x", places[3*i])
+                .setDoubleProperty("y", places[3*i+1]).setDoubleProperty("z", places[3*i+2]);
+}
+
+static void readBody(const SerializationNode& node, CylinderChainForce& force) {
+    vector<int> particles;
+    vector<double> places, rotationalFriction;
+    for (const char* name : ROTATIONAL)
+        rotationalFriction.push_back(node.getChildNode("RotationalFriction").getDoubleProperty(name));
+    for (const SerializationNode& child : node.getChildren()) {
+        if (child.getName() != "Particle")
+            continue;
+        particles.push_back(child.getIntProperty("index"));
+        for (const char* axis : {"x", "y", "z"})
+            places.push_back(child.getDoubleProperty(axis));
+    }
+    force.addBody(particles, places, node.getDoubleProperty("friction"), rotationalFriction,
+            node.getBoolProperty("planar"));
+}
+
 static void write(const CylinderChainForce& force, SerializationNode& node) {
     node.setBoolProperty("usesPeriodic", force.usesPeriodicBoundaryConditions());
     SerializationNode& chains = node.createChildNode("Chains");
@@ -79,6 +112,9 @@ static void write(const CylinderChainForce& force, SerializationNode& node) {
                 .setDoubleProperty("x", point[0]).setDoubleProperty("y", point[1]).setDoubleProperty("z", point[2])
                 .setDoubleProperty("stiffness", stiffness);
     }
+    SerializationNode& bodies = node.createChildNode("Bodies");
+    for (int i = 0; i < force.getNumBodies(); i++)
+        writeBody(force, i, bodies.createChildNode("Body"));
 }
 
 static void addSegment(CylinderChainForce& force, int chain, int segment, const SerializationNode& node) {
@@ -133,8 +169,10 @@ static unique_ptr<CylinderChainForce> readForce(const SerializationNode& node) {
         force->addTether(tether.getIntProperty("chain"), tether.getIntProperty("node"),
                 Vec3(tether.getDoubleProperty("x"), tether.getDoubleProperty("y"), tether.getDoubleProperty("z")),
                 tether.getDoubleProperty("stiffness"));
+    for (auto& body : node.getChildNode("Bodies").getChildren())
+        readBody(body, *force);
     return force;
 }
 
 static const bool isForceRegistered =
-        registerProxy<CylinderChainForce>("CylinderChainForce", 9, write, readForce);
+        registerProxy<CylinderChainForce>("CylinderChainForce", 10, write, readForce);

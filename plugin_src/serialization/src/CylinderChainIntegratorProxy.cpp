@@ -16,39 +16,6 @@ static Vec3 readVector(const SerializationNode& node, const string& name) {
     return {child.getDoubleProperty("x"), child.getDoubleProperty("y"), child.getDoubleProperty("z")};
 }
 
-static const char* const ROTATIONAL[] = {"xx", "xy", "xz", "yy", "yz", "zz"};
-
-static void writeBody(const CylinderChainIntegrator& integrator, int index, SerializationNode& node) {
-    vector<int> particles;
-    vector<double> places, rotationalFriction;
-    double friction;
-    bool planar;
-    integrator.getBody(index, particles, places, friction, rotationalFriction, planar);
-    node.setDoubleProperty("friction", friction).setBoolProperty("planar", planar);
-    SerializationNode& rotational = node.createChildNode("RotationalFriction");
-    for (int i = 0; i < 6; i++)
-        rotational.setDoubleProperty(ROTATIONAL[i], rotationalFriction[i]);
-    for (size_t i = 0; i < particles.size(); i++)
-        node.createChildNode("Particle").setIntProperty("index", particles[i]).setDoubleProperty("x", places[3*i])
-                .setDoubleProperty("y", places[3*i+1]).setDoubleProperty("z", places[3*i+2]);
-}
-
-static void readBody(const SerializationNode& node, CylinderChainIntegrator& integrator) {
-    vector<int> particles;
-    vector<double> places, rotationalFriction;
-    for (const char* name : ROTATIONAL)
-        rotationalFriction.push_back(node.getChildNode("RotationalFriction").getDoubleProperty(name));
-    for (const SerializationNode& child : node.getChildren()) {
-        if (child.getName() != "Particle")
-            continue;
-        particles.push_back(child.getIntProperty("index"));
-        for (const char* axis : {"x", "y", "z"})
-            places.push_back(child.getDoubleProperty(axis));
-    }
-    integrator.addBody(particles, places, node.getDoubleProperty("friction"), rotationalFriction,
-            node.getBoolProperty("planar"));
-}
-
 static void write(const CylinderChainIntegrator& integrator, SerializationNode& node) {
     node.setDoubleProperty("stepSize", integrator.getStepSize());
     node.setDoubleProperty("constraintTolerance", integrator.getConstraintTolerance());
@@ -73,9 +40,6 @@ static void write(const CylinderChainIntegrator& integrator, SerializationNode& 
     for (auto& entry : integrator.getParticleFrictions())
         frictions.createChildNode("Particle").setIntProperty("index", entry.first)
                 .setDoubleProperty("friction", entry.second);
-    SerializationNode& bodies = node.createChildNode("Bodies");
-    for (int i = 0; i < integrator.getNumBodies(); i++)
-        writeBody(integrator, i, bodies.createChildNode("Body"));
 }
 
 static unique_ptr<CylinderChainIntegrator> readIntegrator(const SerializationNode& node) {
@@ -94,10 +58,8 @@ static unique_ptr<CylinderChainIntegrator> readIntegrator(const SerializationNod
             readVector(flow, "GradientZ"), readVector(flow, "Origin"));
     for (auto& particle : node.getChildNode("ParticleFrictions").getChildren())
         integrator->setParticleFriction(particle.getIntProperty("index"), particle.getDoubleProperty("friction"));
-    for (auto& body : node.getChildNode("Bodies").getChildren())
-        readBody(body, *integrator);
     return integrator;
 }
 
 static const bool isIntegratorRegistered =
-        registerProxy<CylinderChainIntegrator>("CylinderChainIntegrator", 5, write, readIntegrator);
+        registerProxy<CylinderChainIntegrator>("CylinderChainIntegrator", 4, write, readIntegrator);

@@ -3,6 +3,7 @@
 
 #include "mechanics/BendingModels.h"
 #include "mechanics/ChainList.h"
+#include "mechanics/RigidBody.h"
 #include "mechanics/StretchingModels.h"
 #include "openmm/Context.h"
 #include "openmm/Force.h"
@@ -285,6 +286,43 @@ public:
      */
     void setBeamChainPropulsion(int chain, double propulsion);
     /**
+     * Add a rigid body: particles outside chains that CylinderChainIntegrator moves as one, with the scheme Implicit;
+     * other Integrators are refused.  The forces on all of its particles move and turn it.  Links, contacts and walls
+     * that take hold of them are in the equations of steps.  At least three particles must not be on one line, which
+     * would not tell how the body is turned.
+     *
+     * Positions that are set in a Context must be those of a body that is rigid.
+     *
+     * @param particles           the indices of the particles, none of which is in another body
+     * @param places              where they are in the frame of the body, three numbers for each, measured in nm.  The
+     *                            origin of this frame is the centre of the body, at which its friction against motion
+     *                            and that against turning are independent.
+     * @param friction            the friction coefficient against motion, measured in kJ ps/mol/nm^2
+     * @param rotationalFriction  the friction coefficient against turning in the frame of the body, measured in
+     *                            kJ ps/mol: the entries xx, xy, xz, yy, yz and zz of a positive definite matrix
+     * @param planar              whether the body moves in a plane of constant z alone, and turns about z alone
+     * @return the index of the body
+     */
+    int addBody(const std::vector<int>& particles, const std::vector<double>& places, double friction,
+            const std::vector<double>& rotationalFriction, bool planar);
+    /**
+     * Get the number of rigid bodies.
+     */
+    int getNumBodies() const {
+        return bodies.size();
+    }
+    /**
+     * Get what a rigid body is.  See addBody() for details.
+     */
+    void getBody(int index, std::vector<int>& particles, std::vector<double>& places, double& friction,
+            std::vector<double>& rotationalFriction, bool& planar) const;
+    /**
+     * Get all rigid bodies.
+     */
+    const std::vector<cylchain::RigidBody>& getBodies() const {
+        return bodies;
+    }
+    /**
      * Get the number of tethers.
      */
     int getNumTethers() const {
@@ -373,6 +411,7 @@ private:
     void checkTether(const TetherInfo& info) const;
     cylchain::ChainList chains;
     std::vector<TetherInfo> tethers;
+    std::vector<cylchain::RigidBody> bodies;
     std::set<std::pair<int, int> > tetheredNodes;
     bool usePeriodic;
 };

@@ -30,7 +30,7 @@ class CylinderChainStepper;
  * mass times getFriction(), as BrownianIntegrator has it, unless setParticleFriction() gives it one of its own.  With a
  * friction of zero, each of them must have one of its own: a Context is refused otherwise.
  *
- * Particles outside chains may be those of rigid bodies, which move as one: see addBody().
+ * Particles outside chains may be those of rigid bodies, which move as one: see CylinderChainForce::addBody().
  *
  * The fluid may flow: see setFlow().  Friction is then relative to the fluid where each segment or particle is.
  *
@@ -151,41 +151,6 @@ public:
      * @param coeff     the friction coefficient, measured in kJ ps/mol/nm^2
      */
     void setParticleFriction(int particle, double coeff);
-    /**
-     * Add a rigid body: particles outside chains that move as one.  The forces on all of them move and turn it.  Links,
-     * contacts and walls that take hold of its particles are in the equations of steps as they are for others, for the
-     * scheme Implicit alone.  What positions do not tell, as an orientation about the line that all particles are on,
-     * is unknown: at least three particles must not be on one line.
-     *
-     * In a Context that exists already, this takes effect when it is reinitialized.  Positions that are set in a
-     * Context must be those of a body that is rigid.
-     *
-     * @param particles           the indices of the particles, none of which is in another body
-     * @param places              where they are in the frame of the body, three numbers for each, measured in nm.  The
-     *                            origin of this frame is the centre of the body, at which its friction against motion
-     *                            and that against turning are independent.
-     * @param friction            the friction coefficient against motion, measured in kJ ps/mol/nm^2
-     * @param rotationalFriction  the friction coefficient against turning in the frame of the body, measured in
-     *                            kJ ps/mol: the entries xx, xy, xz, yy, yz and zz of a positive definite matrix
-     * @param planar              whether the body moves in a plane of constant z alone, and turns about z alone
-     * @return the index of the body
-     */
-    int addBody(const std::vector<int>& particles, const std::vector<double>& places, double friction,
-            const std::vector<double>& rotationalFriction, bool planar);
-    /**
-     * Get the number of rigid bodies.
-     */
-    int getNumBodies() const {
-        return bodies.size();
-    }
-    /**
-     * Get what a rigid body is.  See addBody() for details.
-     */
-    void getBody(int index, std::vector<int>& particles, std::vector<double>& places, double& friction,
-            std::vector<double>& rotationalFriction, bool& planar) const;
-    const std::vector<cylchain::RigidBody>& getBodies() const {
-        return bodies;
-    }
     /**
      * Get how chains are advanced by one step.
      */
@@ -402,11 +367,11 @@ protected:
     void deserializeParameters(const SerializationNode& node);
 private:
     void checkSystem(const System& system, const CylinderChainForceImpl& chains) const;
-    void checkBodies(const System& system, const std::vector<bool>& isNode) const;
+    void checkBodies(const System& system, const std::vector<cylchain::RigidBody>& bodies,
+            const std::vector<bool>& isNode) const;
     std::uint64_t findNextStep() const;
     double temperature, friction;
     std::map<int, double> particleFrictions;
-    std::vector<cylchain::RigidBody> bodies;
     Scheme scheme;
     Precision precision;
     Vec3 flowVelocity, flowGradient[3], flowOrigin;

@@ -52,6 +52,12 @@ public:
         return chains.getBeams();
     }
     /**
+     * Get the rigid bodies.
+     */
+    const std::vector<cylchain::RigidBody>& getBodies() const {
+        return bodies;
+    }
+    /**
      * Throw an exception if a chain has no modes, see Scheme::Modes.
      */
     void requireModes() const;
@@ -70,6 +76,7 @@ public:
 private:
     void lookForModes();
     cylchain::ChainList chains;
+    const std::vector<cylchain::RigidBody> bodies;
     // Those that grow are not taken from the Force any more.
 
     std::set<int> growing;

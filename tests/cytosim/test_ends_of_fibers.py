@@ -1,0 +1,117 @@
+"""What ends of fibers and hands at them become: laws of ``src/sim/fibers`` and ``src/sim/hands`` of Cytosim."""
+
+import numpy as np
+import pytest
+
+from support.cytosim_files import MICROMETER, SECOND, TUBE, translated
+
+CLASSIC = "set fiber tube { rigidity = 20; activity = classic; growing_speed = 0.2, 0.1; shrinking_speed = -0.4, -0.3; "
+
+
+def turning_ends(tmp_path, keys, state="end_state = grow, grow"):
+    found, document = translated(tmp_path, f"{CLASSIC}{keys} }}\nnew tube {{ length = 2; {state} }}\n")
+    assert document.missing == []
+    return found.filaments[0].growth
+
+
+def test_catastrophes_of_both_ends_have_the_rates_of_cytosim(tmp_path):
+    """Free ends, and those whose growth is blocked: add = 0 in ``src/sim/fibers/classic_fiber.cc``."""
+    growth = turning_ends(
+        tmp_path, "catastrophe_rate = 0.02, 0.03; catastrophe_rate_stalled = 0.4, 0.2; rescue_rate = 0.1, 0.5"
+    )
+    length = growth.monomers.length
+    for turning, rates in (
+        (growth.plus_instability, (0.02, 0.4, 0.1, 0.4)),
+        (growth.minus_instability, (0.03, 0.2, 0.5, 0.3)),
+    ):
+        own = turning.catastrophe_rate, turning.blocked_catastrophe_rate, turning.rescue_rate
+        assert own == pytest.approx(tuple(rate / SECOND for rate in rates[:3]))
+        assert turning.shrinking_off_rate * length == pytest.approx(rates[3] * MICROMETER / SECOND)
+
+
+@pytest.mark.parametrize(
+    ("keys", "blocked"),
+    [
+        ("catastrophe_rate = 0.02; catastrophe_rate_stalled = 0.4", 0.4),
+        # As files before 2014 have it, with one growing_force.
+        ("catastrophe_rate = 0.02, 0.3; growing_force = 2", 0.3),
+        ("catastrophe_rate = 0.02; catastrophe_rate_stalled = 0.02", None),
+        # A stalled rate alone means nothing there.
+        ("catastrophe_rate = 0; catastrophe_rate_stalled = 0.4", None),
+        # As many as monomers come: 0.2 um/s in steps of 8 nm or so.
+        ("catastrophe_rate = 1; catastrophe_rate_stalled = 100", 1 + 0.2 / 0.008),
+    ],
+)
+def test_blocked_catastrophes(tmp_path, keys, blocked):
+    growth = turning_ends(tmp_path, keys, "plus_end = grow; minus_end = static")
+    found = growth.plus_instability.blocked_catastrophe_rate
+    assert found == (None if blocked is None else pytest.approx(blocked / SECOND, rel=0.02)) and growth.minus_capped
+    assert growth.plus_instability.catastrophe_length is None
+
+
+def test_catastrophes_in_proportion_to_lengths(tmp_path):
+    growth = turning_ends(tmp_path, "catastrophe_rate = 0.02; catastrophe_length = 5", "plus_end = grow")
+    assert growth.plus_instability.catastrophe_length == 5000.0
+
+
+def test_ends_that_begin_by_shrinking(tmp_path):
+    keys = "catastrophe_rate = 0.02; catastrophe_rate_stalled = 0.4; rescue_rate = 0.1"
+    growth = turning_ends(tmp_path, keys, "plus_end = shrink")
+    states, length = growth.states("plus"), growth.monomers.length
+    assert states.names == ("shrinking", "growing") and growth.vanishes
+    np.testing.assert_allclose(np.array(states.switch_rates) * SECOND, [[0, 0.1], [0.02, 0]])
+    np.testing.assert_allclose(np.array(states.blocked_switch_rates) * SECOND, [[0, 0], [0.38, 0]])
+    assert states.on_rates[0] == 0.0 and states.off_rates[1] == 0.0
+    assert states.off_rates[0] * length == pytest.approx(0.4 * MICROMETER / SECOND)
+    assert states.on_rates[1] * growth.pool.concentration * length == pytest.approx(0.2 * MICROMETER / SECOND)
+
+
+def single(
+    hand, fiber="set fiber tube { rigidity = 20; activity = grow; growing_speed = 0.5 }\n", made="plus_end = grow"
+):
+    text = fiber + f"set hand own {{ binding = 3, 0.02; unbinding = 0.2; {hand} }}\n"
+    text += "set single free { hand = own; stiffness = 10; diffusion = fast }\n"
+    return text + f"new 4 tube {{ length = 2; {made} }}\nnew 9 free\n"
+
+
+def test_hands_that_cut(tmp_path):
+    cut = "activity = cut; cutting_rate = 0.7; new_end_state = grow, static"
+    found, document = translated(tmp_path, single(cut))
+    hand, idle = found.linkers[0].kind.hands
+    assert hand.severing_rate == pytest.approx(0.7 / SECOND) and idle.severing_rate == 0.0
+    assert [group.count for group in found.filaments if group.is_reserve] == [80] and document.missing == []
+    assert found.filaments[0].growth.severing.rate == 0.0
+    # Fibers that have no dynamics are cut, too.
+    found, document = translated(tmp_path, single("activity = cut; cutting_rate = 0.7", TUBE, ""))
+    growth = found.filaments[0].growth
+    assert growth.plus_capped and growth.minus_capped and not growth.vanishes and document.missing == []
+    _, document = translated(tmp_path, single(cut.replace("grow", "shrink")))
+    assert document.missing == ["growth: states of new ends"]
+
+
+def test_hands_at_ends(tmp_path):
+    track = "activity = track; bind_only_end = plus_end, 0.5"
+    found, document = translated(tmp_path, single(track))
+    own = found.linkers[0].kind.hands[0].filament_end
+    assert (own.end, own.range, own.binds_there, own.tracks) == ("plus", 500.0, True, True)
+    assert document.missing == []
+    found, _ = translated(tmp_path, single("bind_only_end = plus_end; bind_end_range = 0.01"))
+    own = found.linkers[0].kind.hands[0].filament_end
+    assert own.range == 10.0 and own.binds_there and not own.tracks
+    motor = "activity = move; speed = 0.8; hold_growing_end = 1; hold_shrinking_end = 1"
+    found, document = translated(tmp_path, single(motor))
+    hand = found.linkers[0].kind.hands[0]
+    assert hand.at_end == "hold" and hand.filament_end.tracks and not hand.filament_end.binds_there
+    assert document.missing == []
+    for hand, options in (
+        (track, {"fiber": TUBE, "made": ""}),
+        ("bind_only_end = center, 0.1", {}),
+        ("hold_shrinking_end = 1", {}),
+        ("activity = move; speed = 0.8; hold_growing_end = 0.9", {}),
+    ):
+        _, document = translated(tmp_path, single(hand, **options))
+        assert document.missing == ["hands near ends"]
+    # 40 steps per second, of which one in a thousand lets go: 0.04/s, less than 0.2/s.
+    seldom = "activity = walk; step_size = 0.02; speed = 0.8; hold_growing_end = 0.999"
+    found, document = translated(tmp_path, single(seldom))
+    assert found.linkers[0].kind.hands[0].at_end == "hold" and document.missing == []
