@@ -233,8 +233,9 @@ def _local(translation, options, key, text, draw):
     text, _, condition = text.partition(" if ")
     if condition:
         translation.left_out(f"if {condition} of {key}", options.line_of(key), "positions: if")
-    if unknown_position(text) is not None:
-        translation.left_out(f"{text!r} of {key}", options.line_of(key), f"positions: {unknown_position(text)}")
+    word = unknown_position(text, None)
+    if word is not None:
+        translation.left_out(f"{text!r} of {key}", options.line_of(key), f"positions: {word}")
         return draw.unit()
     return draw_position(text, draw)
 
@@ -291,14 +292,15 @@ def _add_places(translation, table, new, count, draw):
     fixed = options.text("placement") in ("off", "0", "none")
     for key in ("placement", "position", "direction", "orientation"):
         options.values(key)
-    if text is not None and unknown_position(text) is not None:
+    space = translation.space(options.text(("position", 1)))
+    word = None if text is None else unknown_position(text, space)
+    if word is not None:
         translation.left_out(
             f"the position {text!r}, for which they are anywhere in the space",
             options.line_of("position"),
-            f"positions: {unknown_position(text)}",
+            f"positions: {word}",
         )
         text = None
-    space = translation.space(options.text(("position", 1)))
     draw = translation.draw_in(space, new.line)
     if text in (None, "inside") and (fixed or space is None):
         if not fixed:

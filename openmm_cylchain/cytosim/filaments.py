@@ -80,9 +80,9 @@ def add_on_body(translation, fiber, options, length, count, growing):
         options.values(key)
     table.add("segments", segments)
     table.add("count", count, Note(EXACT, "on bodies", options.line))
-    _finish(translation, table, fiber, length, whole, count, growing)
+    _finish(translation, table, fiber, length, segment, segments, count, growing)
     number = len(translation.document.tables_called("[[filament]]"))
-    add_attached(translation, options, count)
+    add_attached(translation, options, count, segments)
     translation.note_unused(options, "fibers of asters")
     return number, whole
 
