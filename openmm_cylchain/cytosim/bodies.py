@@ -369,24 +369,24 @@ def _add_aster(translation, new, count, draw):
         text = f"nucleation of fibers by {new.name}"
         translation.left_out(text, aster.settings.line_of("nucleate"), "bodies that nucleate fibers")
     aster.settings.values("nucleate")
-    return _add_fibers(translation, new, aster, made, outer, inner)
+    return _add_fibers(translation, new, aster, made, outer, inner, draw)
 
 
-def _add_fibers(translation, new, aster, made, outer, inner):
+def _add_fibers(translation, new, aster, made, outer, inner, draw):
     options = new.settings
     line = options.line_of("fibers")
     kind = options.text("type", default="custom" if "fiber1" in options else "radial")
-    for key in ("separation", "seed_diameter", "aster_angle", "aster_cap", *(f"fiber{own}" for own in range(1, 100))):
+    for key in ("separation", "seed_diameter", *(f"fiber{own}" for own in range(1, 100))):
         options.values(key)
     number = options.number("fibers", default=0.0)
+    if kind == "custom":
+        number = sum(f"fiber{own}" in options for own in range(1, 100))
     name = options.text(("fibers", 1))
     fiber = translation.script.properties.get(name)
     if fiber is None or fiber.kind != "fiber" or number < 1.0:
         if number >= 1.0:
             translation.left_out(f"fibers = {number:g}, {name}", line, "fibers of an aster")
         return
-    if kind not in _TYPES:
-        translation.left_out(f"type = {kind}: fibers are along the radius", options.line_of("type"), f"asters: {kind}")
     block = options.block("fibers", 2)
     own = Settings.of(f"fibers of {new.name}", line, block)
     total = int(number) * made.count
@@ -402,23 +402,75 @@ def _add_fibers(translation, new, aster, made, outer, inner):
         translation.left_out(text, line, "fibers that grow where a body holds them")
         return
     # What a [[filament]] table has that stands by itself.
-    inner, crowded = _least_distance(translation, inner, int(number))
-    arm = min(abs(outer - inner), _LEAST_SHARE * whole)
+    if kind in _TYPES:
+        inner, crowded = _least_distance(translation, inner, int(number))
+        wanted = abs(outer - inner)
+        where = {"distance": quantity(inner, "um"), "spread": "even" if crowded else _TYPES[kind]}
+        if crowded:
+            text = "their ends are as far out, and as evenly, as they have to be not to overlap"
+            made.table.comment(Note(NEAREST, text, new.line))
+    else:
+        where, wanted = _places_of(translation, options, kind, int(number), outer, inner, draw)
+    arm = min(wanted, _LEAST_SHARE * whole)
     held = {
         "table": table,
         "end": end,
         "stiffness": quantity(stiffness[0], "pN/um"),
-        "distance": quantity(inner, "um"),
         "arm_stiffness": quantity(stiffness[1], "pN/um"),
         "arm": quantity(arm or 0.5 * whole, "um"),
-        "spread": "even" if crowded else _TYPES.get(kind, "random"),
+        **where,
     }
-    if crowded:
-        text = "their ends are as far out, and as evenly, as they have to be not to overlap"
-        made.table.comment(Note(NEAREST, text, new.line))
-    exact = arm == abs(outer - inner) and kind in _TYPES
+    exact = arm == wanted
     text = "stiffness and radius of the aster" + ("" if exact else ", the second spring nearer where fibers are short")
     made.table.add("filaments", held, Note(EXACT if exact else NEAREST, text, new.line))
+
+
+def _places_of(translation, options, kind, number, outer, inner, draw):
+    # Of asters that are not radial: places and directions, as src/sim/organizers/aster.cc has them, and an arm.
+    generator, x = draw.generator, np.array([1.0, 0.0, 0.0])
+    if kind == "disc":
+        across = outer * _apart_on_disc(translation, options, number, outer, generator)
+        places = np.column_stack([np.full(number, -0.5 * inner * outer), across])
+        directions, arm = np.tile(x, (number, 1)), inner * outer
+    elif kind == "custom":
+        ends = [[options.vector(f"fiber{own}", end) for end in (0, 1)] for own in range(1, number + 1)]
+        places, vectors = outer * np.array(ends)[:, 0], outer * np.diff(np.array(ends), axis=1)[:, 0]
+        lengths = np.linalg.norm(vectors, axis=1)
+        if np.any(lengths == 0.0):
+            raise options.mistake("fiber1", "must have two places that differ.")
+        directions, arm = vectors / lengths[:, None], float(lengths.mean())
+    else:
+        directions = np.array([draw.unit() for _ in range(number)])
+        if kind == "angular":
+            angle = options.number("aster_angle", default=math.pi)
+            cap = options.number("aster_cap", default=1.0 - math.cos(angle))
+            along = 1.0 - cap * generator.uniform(0.0, 1.0, number)
+            if draw.dimensions == 2:
+                along = np.cos(math.acos(max(-1.0, 1.0 - cap)) * generator.uniform(-1.0, 1.0, number))
+            around = directions - np.outer(directions @ x, x)
+            around /= np.linalg.norm(around, axis=1, keepdims=True)
+            directions = along[:, None] * x + np.sqrt(1.0 - along**2)[:, None] * around
+            places, arm = inner * directions, abs(outer - inner)
+        else:
+            outside = outer * np.array([draw.ball() for _ in range(number)])
+            directions *= np.where(np.sum(directions * outside, axis=1) < 0.0, -1.0, 1.0)[:, None]
+            places, arm = outside - inner * directions, inner
+    if draw.dimensions == 2:
+        places[:, 2] = directions[:, 2] = 0.0
+    directions = [[round(float(own), 12) for own in vector] for vector in directions]
+    return {"places": [point(place) for place in places], "directions": directions}, arm
+
+
+def _apart_on_disc(translation, options, number, outer, generator):
+    # Points of the unit disc, apart by what a seed takes, or as far as there is room for.
+    apart = options.number("seed_diameter", default=0.025) / outer
+    apart = min(apart, 1.0 / math.sqrt(number))
+    found = []
+    while len(found) < number:
+        place = generator.uniform(-1.0, 1.0, 2)
+        if place @ place <= 1.0 and all(np.linalg.norm(place - other) >= apart for other in found):
+            found.append(place)
+    return np.array(found)
 
 
 def _least_distance(translation, distance, count):

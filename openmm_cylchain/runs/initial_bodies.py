@@ -22,7 +22,7 @@ def add_bodies(configuration, filaments, seed):
             slot, body = divmod(index, own.count)
             origin, rotation = placed[body]
             outward = rotation @ own.held.directions[slot]
-            starts[filament] = origin + own.held.distance * outward, outward, own.held.end
+            starts[filament] = origin + rotation @ own.held.places[slot], outward, own.held.end
     return starts
 
 

@@ -47,13 +47,51 @@ def test_asters_hold_fibers_by_two_springs(tmp_path):
     assert document.missing == []
     (body,) = found.bodies
     held = body.held
-    assert (body.count, held.distance, held.arm) == (2, pytest.approx(200.0), pytest.approx(400.0))
+    assert (body.count, held.arm) == (2, pytest.approx(400.0))
     assert (held.stiffness, held.arm_stiffness) == (pytest.approx(1000 * PN_PER_UM), pytest.approx(500 * PN_PER_UM))
     filaments = built_of(found)
     assert len(filaments) == 24
     for number, filament in enumerate(filaments):
         nodes = filament.positions - filaments.bodies[number % 2].positions[0]
         np.testing.assert_allclose(np.linalg.norm(nodes, axis=1), 200.0 + 500.0 * np.arange(7), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("keys", "arm"),
+    [
+        ("type = disc; radius = 0.5, 0.4", 200.0),
+        ("type = angular; aster_angle = 0.5; radius = 0.5, 0.1", 400.0),
+        ("type = astral; radius = 0.5, 0.3", 300.0),
+        ("radius = 0.5; fiber1 = 0 0 0, 1 0 0; fiber2 = 0 1 0, 0 1 1; fiber3 = 0 -1 0, 0 -2 0", 500.0),
+    ],
+)
+def test_asters_that_are_not_radial(tmp_path, keys, arm):
+    """See src/sim/organizers/aster.cc: a cap about x, a disc across x, any place of a ball, or given ones."""
+    text = f"new star {{ solid = core; {keys}; fibers = 3, tube, ( length = 3; ) }}\n"
+    found, document = translated(tmp_path, text)
+    assert document.missing == []
+    held = found.bodies[0].held
+    assert held.arm == pytest.approx(arm)
+    places, directions = held.places, held.directions
+    if "disc" in keys:
+        np.testing.assert_allclose(directions, [[1, 0, 0]] * 3)
+        np.testing.assert_allclose(places[:, 0], -100.0)
+        assert np.linalg.norm(places[:, 1:], axis=1).max() < 500.0
+    elif "angular" in keys:
+        np.testing.assert_allclose(places, 100.0 * directions, atol=1e-5)
+        assert np.all(directions[:, 0] > np.cos(0.5)) and np.any(directions[:, 0] < np.cos(0.1))
+    elif "astral" in keys:
+        outside = places + 300.0 * directions
+        assert np.all(np.linalg.norm(outside, axis=1) < 500.0) and np.all(np.sum(outside * directions, axis=1) > 0.0)
+    else:
+        np.testing.assert_allclose(places, [[0, 0, 0], [0, 500, 0], [0, -500, 0]], atol=1e-9)
+        np.testing.assert_allclose(directions, [[1, 0, 0], [0, 0, 1], [0, -1, 0]], atol=1e-9)
+    filaments = built_of(found)
+    placed = filaments.bodies[0]
+    for place, vector, filament in zip(places, directions, filaments):
+        np.testing.assert_allclose(filament.positions[0], placed.positions[0] + placed.rotation @ place, atol=1e-6)
+        step = filament.positions[1] - filament.positions[0]
+        np.testing.assert_allclose(step, 500.0 * placed.rotation @ vector, atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -165,7 +203,6 @@ def test_singles_have_bases_on_bodies(tmp_path):
 @pytest.mark.parametrize(
     ("text", "missing"),
     [
-        ("new star { solid = core; radius = 0.5; type = disc; fibers = 3, tube, ( length = 2 ) }\n", "asters: disc"),
         ("new core { point1 = center, 0 }\nnew tube { length = 1 }\n", "bodies: solids without a radius"),
         ("new core { point1 = center, 1; position = somewhere 1 }\nnew tube { length = 1 }\n", "positions: somewhere"),
         ("new core { point1 = center, 1, nothing }\nnew tube { length = 1 }\n", "bodies: what is attached to them"),

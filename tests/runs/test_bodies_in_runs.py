@@ -127,6 +127,13 @@ def test_contacts_and_walls_take_spheres():
         (", minus_capped = true", "", "minus_capped = true"),
         ("count = 8", 'count = 8\nstart = "equilibrium"', "must be straight"),
         ("count = 8", "count = 8\ndirection = [1, 0, 0]", "begin on bodies"),
+        ("table = 1, stiff", 'table = 1, places = [["1 nm", "0 nm", "0 nm"]], stiff', "lacks the key 'directions'"),
+        ("table = 1, stiff", "table = 1, directions = [[1, 0, 0]], stiff", "belong to places"),
+        (
+            "table = 1, stiff",
+            'table = 1, places = [["1 nm", "0 nm", "0 nm"]], directions = [[1, 0, 0]], stiff',
+            "but are 1 and 1",
+        ),
         ("count = 8", "count = 8\nplanar = true", "its bodies must be planar"),
         ("body = 3, body_point = 2", "body = 5", "there are 5, counted from 0"),
         ("body = 3, body_point = 2", "body = 3, body_point = 3", "there are 3, from 0 on"),

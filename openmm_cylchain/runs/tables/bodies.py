@@ -56,6 +56,18 @@ _HELD = TableKind(
             "even",
             "Whether directions are spread evenly around the body, or drawn at random.",
         ),
+        Key(
+            "places",
+            Listing(point(), "points", '[["0 nm", "50 nm", "0 nm"], ["0 nm", "-50 nm", "0 nm"]]'),
+            None,
+            "In place of distance and spread: where the filaments of a body are held, in its frame.",
+        ),
+        Key(
+            "directions",
+            Listing(direction(), "directions", "[[1, 0, 0], [1, 0, 0]]"),
+            None,
+            "With places: where each of them points, away from the end that is held.",
+        ),
     ),
     "Filaments that begin on bodies, straight and along the radius: asters, spindle poles. They are held by springs "
     "that stay: links, or, of filaments that grow, linkers that never unbind.",
@@ -121,17 +133,17 @@ BODY = TableKind(
 class HeldFilaments:
     """Filaments that the bodies of a table hold: numbers in the configuration, of which body i of n has i, i+n, ...
 
-    ``directions`` are those of the filaments of a body in its frame, ``bases`` and ``arms`` the numbers of the points
-    that hold them; lengths in nm. ``growing`` says whether linkers hold them.
+    ``places`` and ``directions`` are those of the filaments of a body in its frame, ``bases`` and ``arms`` the numbers
+    of the points that hold them; lengths in nm. ``growing`` says whether linkers hold them.
     """
 
     table: int
     end: str
     stiffness: float
-    distance: float
     arm_stiffness: float | None
     arm: float
     numbers: tuple
+    places: np.ndarray = dataclasses.field(compare=False)
     directions: np.ndarray = dataclasses.field(compare=False)
     bases: tuple = ()
     arms: tuple = ()
@@ -278,36 +290,54 @@ def _held(entries, tables, groups, planar, count, points, radii, seed):
     if sum(one["table"] == table for one in others) > 1:
         raise own.at("table").error(f"is {table}, as in another [[body]] table: a filament is on one body.")
     _check_filaments(tables["filament"][table - 1], own, held, planar)
-    if own["distance"] is None and "radius" not in entries:
-        raise own.error('lacks the key "distance", since the body is no single sphere: distance = "200 nm"')
-    distance = entries["radius"] if own["distance"] is None else own["distance"]
     arm = held[0].type.segment_length if own["arm"] is None else own["arm"]
     if own["arm_stiffness"] is None:
         own.refuse(("arm",), "belongs to an arm_stiffness.")
     shortest = min(_length(group) for group in held)
     if own["arm_stiffness"] is not None and arm > shortest * (1.0 + 1e-9):
         raise own.at("arm").error(f"is {arm:g} nm, but filaments are {shortest:g} nm long: take a shorter one.")
-    generator = np.random.default_rng(seed)
-    directions = _directions(-(-len(numbers) // count), own["spread"], planar, generator)
+    origins, directions = _origins(entries, own, len(numbers), count, planar, np.random.default_rng(seed))
     places = list(points)
-    bases = _add_points(places, len(points), distance * directions)
+    bases = _add_points(places, len(points), origins)
     arms = []
     if own["arm_stiffness"] is not None:
-        arms = _add_points(places, len(points), (distance + arm) * directions)
+        arms = _add_points(places, len(points), origins + arm * directions)
     growing = held[0].growth is not None
     names = ("end", "stiffness")
     return np.array(places), HeldFilaments(
         table,
         *(own[key] for key in names),
-        distance,
         own["arm_stiffness"],
         arm,
         tuple(numbers),
+        origins,
         directions,
         tuple(bases),
         tuple(arms),
         growing,
     )
+
+
+def _origins(entries, own, filaments, count, planar, generator):
+    # Where the filaments of a body are held, and their directions: (n, 3) each.
+    if "places" not in own:
+        own.refuse(("directions",), "belong to places.")
+        if own["distance"] is None and "radius" not in entries:
+            raise own.error('lacks the key "distance", since the body is no single sphere: distance = "200 nm"')
+        distance = entries["radius"] if own["distance"] is None else own["distance"]
+        directions = _directions(-(-filaments // count), own["spread"], planar, generator)
+        return distance * directions, directions
+    own.refuse(("distance", "spread"), "cannot be with places.")
+    own.require("directions")
+    places, directions = np.array(own["places"]), np.array(own["directions"])
+    if not len(places) == len(directions) == filaments / count:
+        raise own.at("places").error(
+            f"and directions must be one for each filament of a body, of which there are {filaments / count:g}, but are "
+            f"{len(places)} and {len(directions)}."
+        )
+    if planar and (np.any(places[:, 2]) or np.any(directions[:, 2])):
+        raise own.at("places").error("and directions must lie in the xy plane, because these bodies are planar.")
+    return places, directions
 
 
 def _check_filaments(entries, own, groups, planar):
@@ -346,15 +376,16 @@ def _directions(count, spread, planar, generator):
 
 
 def _add_points(places, given, vectors):
-    # Their numbers; where one of those that are given is, or all of them are in one place, there is one point.
-    if not np.any(vectors):
-        vectors, several = vectors[:1], len(vectors)
-    else:
-        several = 1
+    # Their numbers; there is one point where several are in one place, or where one of those that are given is.
+    known = {_rounded(there): number for number, there in enumerate(places[:given])}
     numbers = []
     for vector in vectors:
-        (there,) = np.nonzero(np.linalg.norm(np.array(places[:given]) - vector, axis=1) < _SAME_PLACE)
-        numbers.append(int(there[0]) if len(there) else len(places))
-        if not len(there):
+        number = known.setdefault(_rounded(vector), len(places))
+        if number == len(places):
             places.append(vector)
-    return numbers * several
+        numbers.append(number)
+    return numbers
+
+
+def _rounded(vector):
+    return tuple(np.round(vector / _SAME_PLACE).astype(np.int64).tolist())
