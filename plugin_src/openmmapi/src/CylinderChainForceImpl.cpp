@@ -36,8 +36,8 @@ void CylinderChainForceImpl::updateContextState(ContextImpl& context, bool&) {
     if (dynamic_cast<const CylinderChainIntegrator*>(&context.getIntegrator()) != NULL)
         return;
     if (owner.getNumBodies() > 0)
-        throw OpenMMException("CylinderChainForce: There are rigid bodies, which this Integrator would tear apart: use a "
-                "CylinderChainIntegrator");
+        throw OpenMMException("CylinderChainForce: There are rigid bodies, which this Integrator would tear apart: "
+                "use a CylinderChainIntegrator");
     if (planar == -1)
         return;
     throw OpenMMException("CylinderChainForce: "+description->getList().getName(planar)+" is planar, but this "

@@ -122,8 +122,8 @@ StepSettings CylinderChainStepper::describeStep(uint64_t seed, int level, uint64
     settings.kT = BOLTZ*integrator.getTemperature();
     refuseBeams(settings.scheme, settings.kT);
     if (!others.getBodies().empty() && settings.scheme != Scheme::Implicit)
-        throw OpenMMException("CylinderChainIntegrator: Rigid bodies are for scheme Implicit alone, with the force group "
-                "of the CylinderChainForce among the integration force groups");
+        throw OpenMMException("CylinderChainIntegrator: Rigid bodies are for scheme Implicit alone, with the force "
+                "group of the CylinderChainForce among the integration force groups");
     settings.stepSize = integrator.getStepSize();
     settings.seed = seed;
     settings.level = level;
@@ -279,7 +279,8 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
     const CoupledForces& coupled = couplings.describe(getCoupledGroups(), integrator.getFriction());
     if (settings.scheme == Scheme::ImplicitSecondOrder)
         couplings.refuseTwoStages(getCoupledGroups());
-    const Instability found = coupled.empty() && others.getBodies().empty() ? getKernel().displaceChains(context, settings) :
+    const bool moveAlone = coupled.empty() && others.getBodies().empty();
+    const Instability found = moveAlone ? getKernel().displaceChains(context, settings) :
             getKernel().displaceCoupledChains(context, settings, coupled);
     if (found.chain != -1 && found.coupling.force != -1 && areForcesFinite())
         reportCoupling(found.coupling, coupled, settings);
