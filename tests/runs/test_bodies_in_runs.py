@@ -132,7 +132,7 @@ def test_contacts_and_walls_take_spheres():
         (
             "table = 1, stiff",
             'table = 1, places = [["1 nm", "0 nm", "0 nm"]], directions = [[1, 0, 0]], stiff',
-            "but are 1 and 1",
+            "4, but are 1 and 1",
         ),
         ("count = 8", "count = 8\nplanar = true", "its bodies must be planar"),
         ("body = 3, body_point = 2", "body = 5", "there are 5, counted from 0"),

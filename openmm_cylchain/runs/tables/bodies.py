@@ -332,8 +332,8 @@ def _origins(entries, own, filaments, count, planar, generator):
     places, directions = np.array(own["places"]), np.array(own["directions"])
     if not len(places) == len(directions) == filaments / count:
         raise own.at("places").error(
-            f"and directions must be one for each filament of a body, of which there are {filaments / count:g}, but are "
-            f"{len(places)} and {len(directions)}."
+            f"and directions must be one for each filament of a body: {filaments / count:g}, but are {len(places)} "
+            f"and {len(directions)}."
         )
     if planar and (np.any(places[:, 2]) or np.any(directions[:, 2])):
         raise own.at("places").error("and directions must lie in the xy plane, because these bodies are planar.")
