@@ -19,6 +19,7 @@ from .places import (
     unknown_position,
 )
 from .script import count_of
+from .settings import OFF
 
 _DRAG = 3.0
 """Of a cylinder that turns in all directions: 3 pi viscosity length/(ln(length/diameter) + 0.32)."""
@@ -67,6 +68,23 @@ def add_filaments(translation, new):
         share = (count + len(lengths) - 1 - number) // len(lengths)
         if share:
             _add_group(translation, fiber, options, length, share, growing, note)
+
+
+def add_on_body(translation, fiber, options, length, count, growing):
+    """Add fibers that begin on bodies, which say where: the number of their table, and how long they are."""
+    table, segment, segments = _start(translation, fiber, options, length, growing)
+    whole = segment * segments
+    if options.text(("length", 1)) not in OFF:
+        table.comment(Note(NEAREST, "all of the mean length, which is distributed in Cytosim", options.line))
+    for key in ("length", "plus_end", "minus_end", "end_state", "mark"):
+        options.values(key)
+    table.add("segments", segments)
+    table.add("count", count, Note(EXACT, "on bodies", options.line))
+    _finish(translation, table, fiber, length, segment, segments, count, growing)
+    number = len(translation.document.tables_called("[[filament]]"))
+    add_attached(translation, options, count, segments)
+    translation.note_unused(options, "fibers of asters")
+    return number, whole
 
 
 def shared_growth(translation, fiber, options):

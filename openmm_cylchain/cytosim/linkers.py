@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .attached import GROWING, PLACED
+from .bodies import attach_to_bodies, point_of_base
 from .document import EXACT, LEFT_OUT, NEAREST, Note, point, quantity
 from .hands import read_hand
 from .places import draw_inside, unknown_position
@@ -36,20 +37,26 @@ class Linked:
 
 
 def add_linkers(translation, news):
-    """Add the singles and couples of Newly created objects: one [[linkers]] table for each property."""
+    """Add singles and couples: one [[linkers]] table for each property.
+
+    ``news`` are Newly created objects, with how many filaments and tables of bodies were there before them.
+    """
     kinds = {}
-    for new in news:
+    for new, *translation.there in news:
         own = translation.script.named(new.name, new.kind, new.line)
         linked = kinds.setdefault(new.name, Linked())
         adder = _couples if own.kind == "couple" else _singles
-        translation.made_before = new.before
         adder(translation, own, new, linked)
-        translation.made_before = None
-    for name, linked in kinds.items():
-        own = translation.script.properties[name]
+    translation.there = None
+    on_bodies = [own for bodies in translation.bodies for own in bodies.singles]
+    for name in dict.fromkeys([*kinds, *on_bodies]):
+        own, linked = translation.script.properties[name], kinds.get(name, Linked())
+        for bodies in translation.bodies:
+            if bodies.singles.get(name):
+                _table_on_bodies(translation, own, bodies, bodies.singles[name])
         if linked.points or linked.count:
             (_couple_table if own.kind == "couple" else _single_table)(translation, own, linked)
-        else:
+        elif name not in on_bodies:
             own.settings.take_rest()
 
 
@@ -145,8 +152,13 @@ def _singles(translation, own, new, linked):
     options, fixed = new.settings, own.settings.text("activity") == "fixed"
     for key in ("position", "orientation", "direction", "placement", "range", "base"):
         options.values(key)
-    if "base" in options:
-        translation.left_out(f"{count} {new.name} on a body", new.line, "bodies")
+    if "base" in options or "multi_base" in options:
+        for key in ("base", "multi_base"):
+            options.values(key)
+        if "attach" in options:
+            _join_body(translation, own, new, count)
+        elif not attach_to_bodies(translation, new, count):
+            translation.left_out(f"{count} {new.name} on a body", new.line, "bodies: singles on one of several")
         return
     if "attach" in options or "attach1" in options:
         _attached(translation, own, new, linked, count, "attach" if "attach" in options else "attach1")
@@ -155,6 +167,19 @@ def _singles(translation, own, new, linked):
         linked.count += count
         return
     linked.points += _points(translation, new, count, len(linked.points))
+
+
+def _join_body(translation, own, new, count):
+    # A single that joins a point of a body and a filament.
+    site, base = _site(translation, new.settings, "attach"), point_of_base(translation, new.settings)
+    (hand,) = _hands_of(translation, own)
+    if site is None or base is None or not hand.stays:
+        translation.left_out(f"where {count} {new.name} are attached", new.line, PLACED)
+    elif site["grows"]:
+        translation.left_out(f"{count} {new.name} that join for ever", new.line, GROWING)
+    else:
+        for _ in range(count):
+            _link(translation, own, new, site["at"], {"body": base[0], "body_point": base[1]})
 
 
 def _attached(translation, own, new, linked, count, key):
@@ -222,6 +247,26 @@ def _single_table(translation, own, linked):
         idle = {"binding_rate": "0 1/s", "reach": hand.table["reach"], "unbinding_rate": "0 1/s"}
         table.add("hands", [hand.table, idle], Note(NEAREST, "a second hand that never binds"))
         _add_count(translation, table, own, linked, hand)
+    for note in hand.notes:
+        table.comment(note)
+
+
+def _table_on_bodies(translation, own, bodies, points):
+    # Singles whose bases are points of bodies.
+    if own.kind != "single":
+        translation.left_out(f"{own.name} on {bodies.name}", own.line, "bodies: what is attached to them")
+        return
+    (hand,) = _hands_of(translation, own)
+    for key in ("diffusion", "activity"):
+        own.settings.values(key)
+    if not _binds(translation, own, [hand]):
+        return
+    table = translation.document.table("[[linkers]]", own.line)
+    table.add("name", own.name, Note(EXACT, f"single {own.name}", own.line))
+    _add_spring(translation, table, own)
+    table.add("hand", hand.table, Note(NEAREST, _RANGE_AND_LAW))
+    anchors = {"body_table": bodies.number, "body_points": sorted(points)}
+    table.add("anchors", anchors, Note(EXACT, f"on {bodies.name}", bodies.table.line))
     for note in hand.notes:
         table.comment(note)
 

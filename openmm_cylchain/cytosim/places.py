@@ -168,7 +168,7 @@ def _ellipse(draw, numbers, _):
 
 
 def _equator(draw, numbers, _):
-    radius, thickness = (*numbers, 1.0, 0.0)[:2]
+    radius, thickness = (*numbers, *(1.0, 0.0)[len(numbers) :])[:2]
     angle = draw.generator.uniform(0.0, 2.0 * np.pi)
     return _flat(draw, np.array([radius * np.cos(angle), radius * np.sin(angle), thickness * draw.half()[0]]))
 

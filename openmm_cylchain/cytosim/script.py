@@ -40,17 +40,13 @@ class Property:
 
 @dataclass
 class New:
-    """Objects that are created: how many, of which class and property, and with which settings.
-
-    ``before`` is how many filaments are made before them, once that is known.
-    """
+    """Objects that are created: how many, of which class and property, and with which settings."""
 
     count: int
     kind: str
     name: str
     settings: Settings
     line: int
-    before: int | None = None
 
 
 @dataclass

@@ -108,6 +108,7 @@ def add_walls(translation):
             confinement = _confinement(translation, fiber, key)
             if confinement is not None:
                 found.setdefault(confinement, {})[fiber.name] = fiber.settings.line_of(key)
+    _add_walls_of_bodies(translation, found, fibers)
     for (name, stiffness), held in found.items():
         line = next(iter(held.values()))
         space = translation.space(name)
@@ -140,6 +141,32 @@ def _confinement(translation, fiber, key):
         translation.document.note(EXACT, f"{key} of {fiber.name} has no stiffness", line)
         return None
     return settings.confining_space(key), stiffness
+
+
+def _add_walls_of_bodies(translation, found, fibers):
+    # Walls that hold all filaments act on bodies as well, and others on none.
+    for name in dict.fromkeys(own.property for own in translation.bodies):
+        body = translation.script.properties[name]
+        settings, line = body.settings, body.settings.line_of("confine")
+        mode = settings.text("confine")
+        stiffness = settings.number(("confine", 1), "confine_stiffness", default=0.0)
+        space = settings.confining_space()
+        of_all = [own for (own, _), held in found.items() if len(held) >= len(fibers)]
+        if mode in OFF or stiffness == 0.0:
+            if of_all:
+                text = f"{name} is not confined in Cytosim, but walls of all filaments are for all bodies here"
+                translation.document.note(NEAREST, text, body.line)
+        elif mode not in _CONFINED:
+            translation.left_out(f"confine = {mode} of {name}", line, f"surfaces: confine = {mode}")
+        elif space not in of_all and (found or fibers):
+            text = f"confine = {mode} of {name}: walls of bodies are those of all filaments here"
+            translation.left_out(text, line, "walls for some bodies alone")
+        else:
+            if mode != "all_inside":
+                text = f"{name} is inside of walls as a whole; in Cytosim, its points are"
+                translation.document.note(NEAREST, text, line)
+            if not of_all:
+                found[space, stiffness] = {name: line}
 
 
 def add_simulation(translation):

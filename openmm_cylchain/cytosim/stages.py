@@ -5,7 +5,7 @@ import copy
 from ..runs.tables.stages import CHANGES, STAYS
 from .document import EXACT, LEFT_OUT, NEAREST, Note
 
-_REPEATED = ("linkers", "link", "wall", "tether", "pull", "nucleation", "monomers", "filament", "particles")
+_REPEATED = ("linkers", "link", "wall", "tether", "pull", "nucleation", "monomers", "filament", "particles", "body")
 _ABSENT = {
     "linkers": ("count", 0),
     "nucleation": ("total_rate", "0 1/s"),
@@ -121,6 +121,8 @@ def _write_absent(name, values, source, later, document):
     table.entries = [(key, value, notes.get(key)) for key, value in values.items() if key not in names]
     if name == "linkers" and "anchors" in values:
         table.comment(Note(NEAREST, "its anchors are there from the beginning", source.line))
+    if name == "body":
+        table.comment(Note(NEAREST, "it is there from the beginning", source.line))
     same = [index for index, other in enumerate(document.tables) if other.header == source.header]
     place = len(document.tables) - 1
     if same:

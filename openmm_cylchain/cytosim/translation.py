@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from .bodies import KINDS as BODY_KINDS
+from .bodies import add_bodies
 from .document import LEFT_OUT, NEAREST, Document
 from .filaments import add_filaments
 from .growth import add_monomers
@@ -27,10 +29,6 @@ from .spaces import make_space
 from .stages import add_stages
 
 _BODIES = {
-    "solid": "bodies: solids",
-    "bead": "bodies: beads",
-    "sphere": "bodies: spheres",
-    "aster": "bodies: asters",
     "nucleus": "bodies: nuclei",
     "fake": "bodies: spindles (fake)",
     "bundle": "bundles of fibers",
@@ -44,7 +42,6 @@ _NEEDS = {
     ("fiber", "squeeze"): "forces towards a plane",
     ("fiber", "field"): "fields",
     ("fiber", "glue"): "surfaces: glue",
-    ("new single", "attach"): "bodies",
 }
 """What keys need that nothing here asks for, by the kind of what has them."""
 _WITH_EVERY_LENGTH = ("rectangle", "square", "periodic", "strip", "semi_periodic", "ellipse", "dice")
@@ -64,10 +61,10 @@ class Translation:
         self.thermal_energy = thermal_energy(script.simul)
         self.viscosity = script.simul.number("viscosity", default=1.0)
         self.nucleated = []
+        # How many filaments and tables of bodies there are when what is translated is created; None for all.
+        self.bodies, self.there = [], None
         self.growings, self.made, self.filament_count, self.start_files = [], [], 0, {}
         self._spaces, self._type_names = {}, {}
-        # How many filaments there were when what is translated was created, of those that it may name; None for all.
-        self.made_before = None
         self.dimensions = self._find_dimensions(dimensions)
         self.contact_diameter = contact_diameter(script)
         self.steps = max(1, script.steps)
@@ -112,20 +109,22 @@ class Translation:
 
     def find_filament(self, text):
         """The filament that an attachment names, such as actin1, fiber2 or last; None if there is none."""
-        words = re.fullmatch(r"(last|first|[A-Za-z]\w*?)\s*[:~]?\s*(-?\s*\d+)?", (text or "").strip())
-        made = self.made[: self.made_before]
+        words = re.fullmatch(r"(last|first|[A-Za-z]\w*?)\s*([:~]?)\s*(-?\s*\d+)?", (text or "").strip())
+        made = self.made if self.there is None else self.made[: self.there[0]]
         if words is None or not made:
             return None
-        name, number = words[1], int((words[2] or "0").replace(" ", ""))
+        name, number = words[1], int((words[3] or "0").replace(" ", ""))
         if name == "last":
             index = len(made) - 1 + (number if number <= 0 else -number)
         elif name == "first":
             index = number
         else:
-            if words[2] is None:
+            if words[3] is None:
                 return None
             if name != "fiber":
                 made = [own for own in made if own.name == name]
+            # name~1 is the last one, as name0 is.
+            number = 1 - number if words[2] == "~" else number
             index = number - 1 if number > 0 else len(made) - 1 + number
         return made[index] if 0 <= index < len(made) else None
 
@@ -189,13 +188,14 @@ class Translation:
         add_box(self)
         linked = []
         for new in self.script.created:
-            new.before = len(self.made)
             if new.kind == "fiber":
                 add_filaments(self, new)
             elif new.kind in ("single", "couple"):
-                linked.append(new)
+                linked.append((new, len(self.made), len(self.bodies)))
             elif new.kind == "event":
                 add_event(self, new)
+            elif new.kind in BODY_KINDS:
+                add_bodies(self, new)
             elif new.kind in _BODIES:
                 new.settings.take_rest()
                 if count_of(new, self.space()):
@@ -237,8 +237,10 @@ class Translation:
         made = [own.name for own in self.fibers_made()]
         every = []
         for own in self.script.properties.values():
-            if own.kind not in _BODIES and (own.kind != "fiber" or own.name in made):
+            if own.kind not in (*_BODIES, *BODY_KINDS) and (own.kind != "fiber" or own.name in made):
                 every.append((own.settings, own.kind))
+        bodies = {own.property for own in self.bodies}
+        every += [(own.settings, own.kind) for own in self.script.properties.values() if own.name in bodies]
         every += [(new.settings, f"new {new.kind}") for new in self.script.created]
         every += [(self.script.simul, "simul")]
         if self.script.run is not None:

@@ -182,6 +182,14 @@ def random_rotation(generator: np.random.Generator, planar: bool = False) -> Flo
     return (w * w - axis @ axis) * np.eye(3) + 2.0 * np.outer(axis, axis) + 2.0 * w * across
 
 
+def rotation_along(direction: FloatArray) -> FloatArray:
+    """A rotation matrix (3, 3) that takes x to a unit vector, y to the xy plane, and z to the side of z."""
+    across = np.cross([0.0, 0.0, 1.0], direction)
+    length = float(np.linalg.norm(across))
+    across = across / length if length > 1e-9 else np.array([0.0, 1.0, 0.0])
+    return np.stack([direction, across, np.cross(direction, across)], axis=1)
+
+
 def _refuse_coinciding(points, label):
     for number, point in enumerate(points):
         same = np.flatnonzero(np.all(points[:number] == point, axis=1))

@@ -120,7 +120,10 @@ def place_linkers(
             anchored += own.count
         chains, places = np.full((own.count, 2), -1), np.zeros((own.count, 2))
         generator = np.random.default_rng((own.seed, number))
-        if own.anchors is None:
+        hand = int(own.anchors is not None)
+        if own.places is not None:
+            chains[: own.bound, hand], places[: own.bound, hand] = zip(*own.places)
+        elif own.anchors is None:
             where = first_places.anywhere(own.kind.hands[0], own.bound, generator, own.kind.name)
             chains[: own.bound, 0], places[: own.bound, 0] = where
         elif own.bound:

@@ -19,6 +19,7 @@ from .keys import ConfigurationError, Place, Text
 from .stages import read_stages
 from .start_files import digest_of, find_start_file
 from .table import ACTIVE, UnknownKeyError
+from .tables.bodies import BODY, read_body, with_bodies
 from .tables.couplings import (
     CONTACTS,
     LINK,
@@ -55,6 +56,7 @@ TABLES = (
     NUCLEATION,
     BRANCHING,
     PARTICLES,
+    BODY,
     LINKERS,
     LINK,
     JOINT,
@@ -80,6 +82,7 @@ _OWNERS = (
     BOX,
     FLOW,
     PARTICLES,
+    BODY,
     LINK,
     JOINT,
     TETHER,
@@ -114,6 +117,7 @@ class Configuration:
     pulls: tuple = ()
     links: tuple = ()
     joints: tuple = ()
+    bodies: tuple = ()
     monomers: tuple = dataclasses.field(default=(), compare=False)
     tables: dict = dataclasses.field(default_factory=dict, compare=False, repr=False)
     start_files: dict = dataclasses.field(default_factory=dict, compare=False)
@@ -205,7 +209,10 @@ def _configuration(raw, text, folder, lines):
     check_names(tables["monomers"], monomers)
     groups = _filaments(tables, solvent, box, folder, monomers)
     check_walls(tables["wall"], walls, groups)
-    linkers = tuple(read_linkers(own, groups, box, read_seed(settings), walls) for own in tables["linkers"])
+    seed = read_seed(settings)
+    bodies = tuple(read_body(own, tables, groups, box, seed) for own in tables["body"])
+    groups = with_bodies(groups, bodies)
+    linkers = tuple(read_linkers(own, groups, box, seed, walls, bodies) for own in tables["linkers"])
     configuration = Configuration(
         title,
         solvent,
@@ -220,8 +227,9 @@ def _configuration(raw, text, folder, lines):
         walls,
         tuple(read_tether(own, groups) for own in tables["tether"]),
         tuple(read_pull(own, groups) for own in tables["pull"]),
-        tuple(read_link(own, groups) for own in tables["link"]),
+        tuple(read_link(own, groups, bodies) for own in tables["link"]),
         tuple(read_joint(own, groups) for own in tables["joint"]),
+        bodies,
         monomers,
         tables,
         dict(_start_files(tables["filament"], folder)),
@@ -232,7 +240,7 @@ def _configuration(raw, text, folder, lines):
     configuration = dataclasses.replace(configuration, filaments=_disturbed(configuration))
     with settings.naming():
         simulation = read_simulation(
-            settings, lambda scheme, engine: recommended_step(configuration, scheme, engine, read_seed(settings)).step
+            settings, lambda scheme, engine: recommended_step(configuration, scheme, engine, seed).step
         )
     return dataclasses.replace(configuration, simulation=simulation)
 
@@ -312,9 +320,12 @@ def _check_engine(settings, configuration):
     with settings.naming():
         if choose_engine(settings["engine"]) == "compiled":
             return
-    for name, there in (("linkers", configuration.linkers), ("contacts", configuration.contacts)):
+    for header, there in (
+        ("[[linkers]]", configuration.linkers),
+        ("[contacts]", configuration.contacts),
+        ("[[body]]", configuration.bodies),
+    ):
         if there:
-            header = "[[linkers]]" if name == "linkers" else "[contacts]"
             raise settings.at("engine").error(f'has no {header}: leave it out, or write "compiled".')
     for entries in configuration.tables["wall"]:
         if entries["distance"]:
@@ -339,6 +350,7 @@ def _disturbed(configuration):
             "linkers": binds_to(group, configuration.linkers),
             "links": bool(linked & numbers) or any(link.between is None for link in configuration.links),
             "joints": bool(joined & numbers),
+            "bodies": group.on_body,
             "contacts": configuration.contacts is not None,
             "walls": any(wall.holds(group.type) for wall in configuration.walls),
             "forces": bool(pulled & numbers),

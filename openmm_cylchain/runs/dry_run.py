@@ -65,6 +65,9 @@ def _what_is_built(configuration, built):
             yield f"      {_beginnings(group, configuration.box)}"
     yield from _populations(configuration)
     yield from (f"    {own.count} × {own.name}, {own.diameter:g} nm" for own in configuration.particles)
+    for own in configuration.bodies:
+        spheres = int((own.body.radii > 0.0).sum())
+        yield f"    {own.count} × {own.body.name}, {_counted(spheres, 'sphere')} of {own.body.radii.max():g} nm"
     for label, own in zip(linker_labels(configuration), configuration.linkers):
         count = len(own.anchors) if own.anchors is not None else own.count
         yield f"    {'linkers at a concentration' if count is None else _counted(count, 'linker')}: {label}"

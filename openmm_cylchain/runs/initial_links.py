@@ -9,6 +9,7 @@ from ..couplings.crosslinks import Crosslinks
 from ..couplings.link_places import LinkPlaces, as_places
 from ..errors import InputError
 from ..filaments.attachments import attachment_positions, lengths_along, places_along
+from .initial_bodies import holding_links
 
 _MOST_PLACES, _MOST_PAIRS = 10**7, 3 * 10**7
 """On filaments, and of places that are near enough, to draw random links from."""
@@ -24,18 +25,22 @@ def add_links(configuration, filaments, system, seed):
     count = 0
     for model in ("harmonic", "fene"):
         groups = [(number, own) for number, own in enumerate(configuration.links) if own.model == model]
-        if not groups:
+        held = holding_links(configuration, filaments) if model == "harmonic" else []
+        if not groups and not held:
             continue
-        _, first = groups[0]
-        links = Crosslinks(first.stiffness, first.rest_length or 0.0, model, first.maximum_extension)
-        table = _table(configuration, groups, filaments, seed)
+        if groups:
+            _, first = groups[0]
+            links = Crosslinks(first.stiffness, first.rest_length or 0.0, model, first.maximum_extension)
+        else:
+            links = Crosslinks(held[0][1][0], 0.0)
+        table = _table(configuration, groups, held, filaments, seed)
         links.set_table(None, table)
         links.add_to(system)
         count += len(table)
     return count
 
 
-def _table(configuration, groups, filaments, seed):
+def _table(configuration, groups, held, filaments, seed):
     parts = []
     for number, own in groups:
         with configuration.tables["link"][number].naming():
@@ -45,6 +50,10 @@ def _table(configuration, groups, filaments, seed):
             _refuse_torn(own, distances, rests)
         extension = np.inf if own.maximum_extension is None else own.maximum_extension
         parts.append((places, rests, np.full(len(rests), own.stiffness), np.full(len(rests), extension)))
+    # Behind those of the file.
+    for places, stiffness, rests in held:
+        places.check(np.arange(len(places)), None)
+        parts.append((places, rests, stiffness, np.full(len(rests), np.inf)))
     places, *columns = zip(*parts)
     pairs, partners, fractions, points = (
         np.concatenate([getattr(one, name) for one in places]) for name in ("pairs", "partners", "fractions", "points")
@@ -81,6 +90,9 @@ def _nearest(vectors, box):
 
 
 def _place(entries, filaments):
+    if entries["body"] is not None:
+        number, point = entries["body"], entries["body_point"]
+        return int(filaments.body_indices[number][point]), filaments.bodies[number].positions[point]
     if entries["point"] is not None:
         return entries["point"], np.array(entries["point"])
     number, nodes = entries["filament"], filaments[entries["filament"]].positions

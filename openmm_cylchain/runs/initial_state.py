@@ -25,6 +25,7 @@ from ..systems.filaments import Filaments
 from ..theory import chain_mean_square_end_to_end
 from ..time_steps.recommended_step import recommended_time_step
 from .errors_of_tables import located_errors
+from .initial_bodies import add_bodies, add_holding_linkers, first_particles, spheres_of_bodies
 from .initial_links import add_links
 from .keys import ConfigurationError
 
@@ -73,6 +74,7 @@ def build_system(configuration, engine, seed, kinetics=True, begun=None):
     topology, system, positions = filaments.build(box_vectors(configuration.box))
     positions, spheres, radii, friction = _add_particles(configuration, seed, topology, system, positions)
     present = filaments if all(own.takes_part for own in filaments) else FilamentsThatTakePart(filaments)
+    touching, touching_radii = spheres_of_bodies(configuration, filaments, contacts=True)
     count = add_links(configuration, filaments, system, seed)
     _add_joints(configuration, filaments, system)
     tables = configuration.tables
@@ -84,11 +86,13 @@ def build_system(configuration, engine, seed, kinetics=True, begun=None):
                 system,
                 own.diameter,
                 own.stiffness,
-                spheres,
-                2.0 * radii if len(spheres) else None,
+                [*spheres, *touching],
+                2.0 * np.concatenate([radii, touching_radii]) if spheres or touching else None,
                 own.excluded_neighbors,
             )
         system.addForce(force)
+    enclosed, enclosed_radii = spheres_of_bodies(configuration, filaments, contacts=False)
+    spheres, radii = [*spheres, *enclosed], np.concatenate([radii, enclosed_radii])
     for own, entries in zip(configuration.walls, tables["wall"]):
         with entries.naming():
             system.addForce(_wall(own, present, system, spheres, radii))
@@ -109,6 +113,7 @@ def stands_alone(configuration):
         or configuration.pulls
         or configuration.tethers
         or configuration.particles
+        or configuration.bodies
         or configuration.flow
         or any(own.growth is not None for own in configuration.filaments)
     )
@@ -153,6 +158,7 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
     """
     solvent, box = configuration.solvent, configuration.box
     filaments = Filaments(solvent.viscosity, solvent.temperature, engine)
+    on_bodies = add_bodies(configuration, filaments, seed)
     centers = _grid_centers(configuration.filaments, solvent.temperature) if box is None else None
     planar = None if configuration.contacts is None else PlanarSegments(box_vectors(box))
     messages = ProgressMessages()
@@ -173,7 +179,10 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
                 continue
             places = np.random.default_rng([seed, number, 1])
             own = group, index, solvent.temperature, seed, number, places, box, centers
-            nodes, control_points = _nodes(*own, planar if group.planar else None)
+            if group.on_body:
+                nodes, control_points = _on_body(group, *on_bodies[number], f"Filament {number}")
+            else:
+                nodes, control_points = _nodes(*own, planar if group.planar else None)
             if planar is not None and group.planar:
                 planar.add(number, nodes, group.closed)
             _add(filaments, group, nodes, control_points, kinetics)
@@ -194,7 +203,7 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
                 point = filaments[number].positions[own.node] if own.point is None else own.point
                 filaments.add_tether(number, own.node, point, own.stiffness)
     for own, entries in zip(configuration.linkers if kinetics else (), configuration.tables["linkers"]):
-        anchors = None if own.anchors is None else np.array(own.anchors)
+        anchors = _anchors(own, configuration, filaments)
         # What is within reach of an anchor is known when overlaps have come apart: see ``relaxation``.
         later = anchors is not None and configuration.relaxes
         with entries.naming():
@@ -210,7 +219,18 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
                 planar=own.planar,
                 region=own.region,
             )
+    add_holding_linkers(configuration, filaments, seed)
     return filaments
+
+
+def _anchors(own, configuration, filaments):
+    if own.body_anchors is None:
+        return None if own.anchors is None else np.array(own.anchors)
+    table, points = own.body_anchors
+    firsts = first_particles(configuration, filaments)
+    before = sum(group.count for group in configuration.bodies[: table - 1])
+    bodies = firsts[before : before + configuration.bodies[table - 1].count]
+    return (bodies[:, None] + np.array(points)).ravel()
 
 
 def box_vectors(box):
@@ -275,6 +295,13 @@ def _nodes(group, index, temperature, seed, number, places, box, centers, planar
         shift = np.array(group.position) - (nodes.mean(axis=0) if group.closed else 0.0)
         return tuple(None if points is None else points + shift for points in shape)
     return _moved(group, shape, next(centers), nodes.mean(axis=0), group.height)
+
+
+def _on_body(group, place, outward, end, label):
+    # Straight along the radius, with its first or its last node at the place.
+    length = float(group.type.segment_lengths(group.segments, False).sum())
+    own = (place, outward) if end == "minus" else (place + length * outward, -outward)
+    return shapes.straight(group.type, group.segments, *own, label)
 
 
 def _in_box(group, temperature, seed, number, places, box, planar):
@@ -353,7 +380,10 @@ def _grid_centers(groups, temperature):
     groups = [
         group
         for group in groups
-        if group.position is None and group.inside is None and group.positions is None and not group.is_reserve
+        if group.position is None
+        and group.inside is None
+        and group.positions is None
+        and not (group.is_reserve or group.on_body)
     ]
     count = sum(group.count for group in groups)
     spacing = 1.1 * max((_extent(group, temperature) for group in groups), default=0.0)

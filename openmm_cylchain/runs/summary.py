@@ -38,6 +38,7 @@ _DISTURBANCES = {
     "linkers": "linkers bind to these filaments",
     "links": "links join them",
     "joints": "joints hold their directions",
+    "bodies": "rigid bodies hold them",
     "contacts": "contacts keep them apart",
     "walls": "walls confine them",
     "forces": "constant forces pull at them",

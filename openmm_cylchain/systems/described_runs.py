@@ -94,16 +94,23 @@ def describe_system(
 
 
 def _others(filaments, system, topology, contacts, diameters):
-    # Virtual sites are places on filaments, or on what is drawn already.
+    # Virtual sites are places on filaments, or on what is drawn already; so are points of bodies without a radius.
+    of_bodies = {
+        int(particle): 2.0 * radius
+        for placed, own in zip(filaments.bodies, filaments.body_indices)
+        for particle, radius in zip(own, placed.body.radii)
+    }
+    places = {particle for particle, diameter in of_bodies.items() if diameter == 0.0}
     known = {
         **_sigmas(system),
+        **of_bodies,
         **{sphere: diameter for own in contacts for sphere, diameter in own.spheres},
         **diameters,
     }
     nodes = {int(node) for own in (*filaments.node_indices, *filaments.control_point_indices) for node in own}
     kinds: dict[tuple[str, float], list[int]] = {}
     for atom in topology.atoms():
-        if atom.index not in nodes and not system.isVirtualSite(atom.index):
+        if atom.index not in nodes and atom.index not in places and not system.isVirtualSite(atom.index):
             kinds.setdefault((atom.residue.name, known.get(atom.index, 0.0)), []).append(atom.index)
     return tuple(DescribedParticles(name, tuple(own), diameter) for (name, diameter), own in kinds.items())
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -16,9 +17,10 @@ from ..filaments.growth_refusals import growth_refusal
 from ..filaments.placement import named_nodes
 from ..filaments.segment_place import SegmentPlace
 from ..kinetics.crosslinker import Crosslinker
+from ..kinetics.first_places import contour_of
 from ..kinetics.growth_force import branchings_of
 from ..kinetics.linkers import Linkers, as_linkers, warn_if_springs_do_not_fit
-from ..units.quantities import LENGTH, STIFFNESS, positive, shown, vector, whole_number
+from ..units.quantities import LENGTH, STIFFNESS, non_negative, positive, shown, vector, whole_number
 from ..units.types import Indices, IntArray, Scalar, Vector, Vectors
 from .added_filaments import AddedFilaments
 
@@ -218,6 +220,7 @@ class TiedFilaments(AddedFilaments):
         diffusion: Scalar | None = None,
         planar: bool = False,
         region: Shape | Sequence[Shape] | None = None,
+        places: Sequence[tuple[int, Scalar]] | None = None,
     ) -> int:
         """Add linkers that bind to filaments, walk along them and unbind: crosslinkers or motors.
 
@@ -257,6 +260,9 @@ class TiedFilaments(AddedFilaments):
             Whether those that are not bound stay in the plane z = 0. The factor of the rate is R'/R then.
         region : Shape, or several, optional
             What those that diffuse are within; the walls of the System (``filament_wall_force``) if not given.
+        places : sequence of (filament, arc length), optional
+            Where those begin bound, for each of them: the number of a filament, and the distance from its first node
+            along it with segments at rest. Hands with anchors that never unbind hold what grows there for ever.
 
         Returns
         -------
@@ -282,8 +288,10 @@ class TiedFilaments(AddedFilaments):
             )
         if self._nodes is not None:
             raise InputError("These filaments are already in a System: add linkers before.")
-        own = as_linkers(kind, count, concentration, volume, anchors, bound, seed, diffusion, planar, region)
-        self._linkers.append(own)
+        linkers = as_linkers(kind, count, concentration, volume, anchors, bound, seed, diffusion, planar, region)
+        if places is not None:
+            linkers = replace(linkers, places=self._first_places(places, linkers))
+        self._linkers.append(linkers)
         warn_if_springs_do_not_fit(kind, self.temperature)
         return len(self._linkers) - 1
 
@@ -297,6 +305,23 @@ class TiedFilaments(AddedFilaments):
             ]
             self._joints = len(self), [linkers for joint in joints for linkers in joint]
         return (*self._linkers, *self._joints[1])
+
+    def _first_places(self, places, linkers):
+        label = f"Linkers {linkers.kind.name!r}"
+        hand = linkers.kind.hands[0 if linkers.anchors is None else 1]
+        if len(places) != linkers.bound:
+            raise InputError(f"{label}: {linkers.bound} begin bound, but there are {len(places)} places for them.")
+        found = []
+        for filament, along in places:
+            number = self._filament_number(filament, label)
+            along = non_negative(along, LENGTH, f"{label}: places")
+            length = contour_of(self[number])[-1]
+            if not hand.binds(self[number].type) or hand.site_spacing is not None:
+                raise InputError(f"{label}: places are for hands without sites, which bind to filament {number}.")
+            if along > length * (1.0 + 1e-9):
+                raise InputError(f"{label}: {along:g} nm is beyond the end of filament {number}, {length:g} nm long.")
+            found.append((number, min(along, length)))
+        return tuple(found)
 
     def _attach(self, attachment):
         self._attachments.append(attachment)

@@ -462,11 +462,11 @@ def test_two_dimensions_are_found(tmp_path):
     assert found.filaments[0].planar and not any("--dimensions" in note.text for note in document.notes)
 
 
-def test_parts_and_bodies_are_said(tmp_path):
-    text = TUBE + "new tube\nset bead ball { confine = off }\nnew 3 ball { radius = 1 }\nrun 5000 system\ndelete tube\n"
+def test_parts_and_fields_are_said(tmp_path):
+    text = TUBE + "new tube\nset field ball { confine = off }\nnew ball\nrun 5000 system\ndelete tube\n"
     text += "new tube\n"
     _, document = translated(tmp_path, text)
-    assert document.missing == ["stages: filaments that go, are cut, or come and grow", "bodies: beads"]
+    assert document.missing == ["stages: filaments that go, are cut, or come and grow", "fields"]
 
 
 def test_runs_become_stages(tmp_path):

@@ -14,7 +14,7 @@ from openmm_cylchain.runs.initial_state import build_system
 from openmm_cylchain.runs.run import run
 from support.checkpoints import resealed
 from support.commands import finish, start, wait_for_size
-from support.configurations import COMING_AND_GOING, ENDS, EVERYTHING, GROWING
+from support.configurations import BODIES, COMING_AND_GOING, ENDS, EVERYTHING, GROWING
 
 
 @pytest.mark.parametrize("kind", START_NAMES)
@@ -93,8 +93,12 @@ def test_dry_run(tmp_path, capsys):
             ("energies.csv", "growth.csv", "linkers.csv", "linkers.npy", "wall_forces.csv", "contact_forces.csv"),
         ),
         (ENDS, ("energies.csv", "growth.csv", "linkers.csv", "linkers.npy")),
+        (
+            BODIES,
+            ("energies.csv", "growth.csv", "linkers.csv", "linkers.npy", "wall_forces.csv", "contact_forces.csv"),
+        ),
     ],
-    ids=["everything", "growing", "coming and going", "ends"],
+    ids=["everything", "growing", "coming and going", "ends", "bodies"],
 )
 def test_run_with_everything_is_resumed_to_the_bit(tmp_path, text, tables):
     (tmp_path / "all.toml").write_text(text)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from openmm_cylchain.runs.beginnings import START_NAMES, start_text
-from support.configurations import BEAMS, EVERYTHING
+from support.configurations import BEAMS, BODIES, EVERYTHING
 from support.mutations import mutated, outcome
 
 # Without comments, so that there is something to change in every line, and with few filaments.
@@ -15,7 +15,7 @@ SMALL = [
     for kind in START_NAMES
 ]
 SMALL = [text.replace("count = 60\n", "count = 4\n").replace("count = 40\n", "count = 4\n") for text in SMALL]
-TEXTS = [EVERYTHING.strip(), BEAMS.strip(), *SMALL]
+TEXTS = [EVERYTHING.strip(), BEAMS.strip(), BODIES.strip(), *SMALL]
 
 
 def outcomes(seed, count):

@@ -12,7 +12,7 @@ from openmm_cylchain.runs.beginnings import START_NAMES, start_text
 from openmm_cylchain.runs.configuration import TABLES, parse_configuration
 from openmm_cylchain.runs.reference import reference_page
 from openmm_cylchain.runs.schema import configuration_schema, format_schema
-from support.configurations import BEAMS, COMING_AND_GOING, ENDS, EVERYTHING, GROWING
+from support.configurations import BEAMS, BODIES, COMING_AND_GOING, ENDS, EVERYTHING, GROWING
 from support.repository import EXAMPLES, ROOT
 from support.staged_runs import MANY_CHANGES
 
@@ -31,6 +31,7 @@ FILES = [
     COMING_AND_GOING,
     ENDS,
     MANY_CHANGES,
+    BODIES,
 ]
 
 
@@ -57,9 +58,9 @@ def test_files_are_valid(text):
 
 
 def test_everything_has_every_table_and_the_examples_are_there():
-    assert len(FILES) == 16
+    assert len(FILES) == 17
     # Joints are between filaments of beam elements.
-    tables = {table for text in (EVERYTHING, BEAMS, GROWING, COMING_AND_GOING) for table in tomllib.loads(text)}
+    tables = {table for text in (EVERYTHING, BEAMS, BODIES, GROWING, COMING_AND_GOING) for table in tomllib.loads(text)}
     assert all(kind.name in tables for kind in TABLES)
 
 

@@ -399,3 +399,73 @@ def placed_filaments(configuration):
     """Filaments with their initial positions, and linkers, that a run of a configuration has."""
     settings = configuration.simulation
     return place_filaments(configuration, settings.engine, settings.seed)
+
+
+BODIES = """
+title = "bodies"
+[solvent]
+temperature = "300 K"
+viscosity = "0.01 Pa*s"
+[[filament]]
+type = "MICROTUBULE"
+segment_length = "250 nm"
+segments = [4, 6]
+count = 8
+[[filament]]
+type = "MICROTUBULE"
+segment_length = "240 nm"
+segments = 4
+count = 4
+growth = { monomers = "tubulin", longest = "2 um", minus_capped = true }
+[[filament]]
+type = "F_ACTIN"
+segment_length = "100 nm"
+segments = 4
+inside = { shape = "sphere", radius = "1 um" }
+[[monomers]]
+name = "tubulin"
+length = "8 nm"
+concentration = "10 uM"
+plus_on_rate = "100 1/(uM*s)"
+[[body]]
+name = "POLE"
+radius = "200 nm"
+positions = [["-1 um", "0 um", "0 um"], ["1 um", "0 um", "0 um"]]
+filaments = { table = 1, stiffness = "1 pN/nm", arm_stiffness = "0.5 pN/nm" }
+[[body]]
+name = "MTOC"
+radius = "100 nm"
+positions = [["0 um", "3 um", "0 um"]]
+direction = [0, 1, 0]
+filaments = { table = 2, stiffness = "1 pN/nm", arm_stiffness = "0.5 pN/nm", arm = "300 nm" }
+[[body]]
+name = "CARGO"
+points = [["0 nm", "0 nm", "0 nm"], ["150 nm", "0 nm", "0 nm"], ["0 nm", "150 nm", "0 nm"]]
+radii = ["100 nm", "60 nm", "0 nm"]
+count = 2
+inside = { shape = "sphere", radius = "3 um" }
+[[linkers]]
+type = "KINESIN_1"
+anchors = { body_table = 3, body_points = [2, 2, 0] }
+[[link]]
+between = [{ body = 3, body_point = 2 }, { filament = 12, node = 0 }]
+stiffness = "0.1 pN/nm"
+rest_length = "0 nm"
+[[link]]
+between = [{ body = 4 }, { point = ["0 um", "-3 um", "0 um"] }]
+stiffness = "0.1 pN/nm"
+rest_length = "0 nm"
+[contacts]
+diameter = "25 nm"
+[[wall]]
+shape = "sphere"
+radius = "6 um"
+stiffness = "0.1 pN/nm"
+[simulation]
+time_step = "0.5 us"
+duration = "0.2 ms"
+report_interval = "10 us"
+checkpoint_interval = "40 us"
+platform = "CPU"
+seed = 3
+"""

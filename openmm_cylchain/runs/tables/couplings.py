@@ -20,6 +20,7 @@ from ..keys import (
     point,
 )
 from ..table import ACTIVE, TableKind
+from .bodies import check_body_point
 from .filament_types import TypeNames
 from .shapes import SHAPE_KEYS, read_shape
 
@@ -43,7 +44,7 @@ CONTACTS = TableKind(
         ACTIVE,
     ),
     "Filaments do not pass through each other: their segments are capsules, see `capsule_contact_force`. [[particles]] "
-    "with a diameter take part as spheres.",
+    "and [[body]] with a diameter take part as spheres.",
 )
 
 WALL = TableKind(
@@ -60,7 +61,7 @@ WALL = TableKind(
         Key("holds", TypeNames(), None, "Names of filament types that it is for, and for no particles."),
         ACTIVE,
     ),
-    "A wall around all filaments and particles, or those of some types, see `filament_wall_force`.",
+    "A wall around all filaments, particles and bodies, or filaments of some types, see `filament_wall_force`.",
     repeated=True,
 )
 
@@ -127,8 +128,10 @@ PLACE_KEYS = (
     Key("fraction", Number("0.5"), None, "Place on that segment, 0 to 1."),
     Key("node", Whole(-(10**9), 10**9, "0"), None, "Number of its node, in place of a segment."),
     Key("point", point(), None, "A fixed point, in place of a filament."),
+    Key("body", Whole(0, None, "0"), None, "Number of a body, counted from 0 in the order of the file."),
+    Key("body_point", Whole(0, None, "0"), 0, "Number of its point; 0 is the centre of a sphere."),
 )
-_PLACE = TableKind("place", PLACE_KEYS, "A place on a filament, or a point.")
+_PLACE = TableKind("place", PLACE_KEYS, "A place on a filament or a body, or a point.")
 _PLACES = '[{ filament = 0, arc_length = "1 um" }, { filament = 1, node = 0 }]'
 
 LINK = TableKind(
@@ -292,15 +295,15 @@ def read_pull(entries, groups):
     return Pull(numbers, entries["tension"], entries["direction"], entries["node"], entries["force"])
 
 
-def read_link(entries, groups):
+def read_link(entries, groups, bodies):
     """The LinkGroup of a [[link]] table."""
     entries.only_one("between", "within")
     if "between" in entries:
         entries.refuse(("count", "spacing"), "belongs to random links, within a distance.")
         for place in entries["between"]:
-            check_place(place, groups)
+            check_place(place, groups, bodies)
         if all("point" in place for place in entries["between"]):
-            raise entries.at("between").error("must have a filament: two points cannot be joined.")
+            raise entries.at("between").error("must have a filament or a body: two points cannot be joined.")
     elif "within" not in entries:
         raise entries.error(f'lacks its places: add a line such as between = {_PLACES}, or within = "30 nm".')
     if (entries["model"] == "fene") != ("maximum_extension" in entries):
@@ -355,8 +358,13 @@ def _check_node(entries, numbers, groups):
             )
 
 
-def check_place(place, groups):
-    """Raise ConfigurationError unless a table is a place on a filament of the groups, or a point."""
+def check_place(place, groups, bodies=()):
+    """Raise ConfigurationError unless a table is a place on a filament of the groups or on a body, or a point."""
+    if "body" in place:
+        place.refuse(("filament", "arc_length", "segment", "fraction", "node", "point"), "cannot be with a body.")
+        check_body_point(place, bodies)
+        return
+    place.refuse(("body_point",), "belongs to a body.")
     if "point" in place:
         place.refuse(("filament", "arc_length", "segment", "fraction", "node"), "cannot be with a point.")
         return

@@ -156,7 +156,8 @@ class FilamentGroup:
     ``own_path`` that of the table that reserves places, if it is not that one, and ``nucleation`` how filaments begin.
     ``disturbed`` is what makes them no free chains, in words: links, walls and so on; ``tension`` that of their ends in
     kJ/(mol nm), with its direction, if nothing else is. ``positions`` are those of a file, or given ones, for each
-    filament, and ``control_points`` those of beam elements or None. Those that grow have ``spare_nodes`` each.
+    filament, and ``control_points`` those of beam elements or None. Those that grow have ``spare_nodes`` each;
+    ``on_body`` says whether bodies hold them, which know where they are.
     """
 
     type: ChainType
@@ -184,6 +185,7 @@ class FilamentGroup:
     own_path: tuple = ()
     active: bool = True
     nucleation: Nucleation | None = dataclasses.field(default=None, compare=False)
+    on_body: bool = False
 
     @property
     def path(self):

@@ -269,7 +269,7 @@ def check_with_others(tables, configuration, settings):
     if settings["scheme"] not in (None, *IMPLICIT_SCHEMES):
         raise settings.at("scheme").error('has no filaments that grow: leave it out, or write "implicit".')
     for entries, own in zip(tables["linkers"], configuration.linkers):
-        if own.anchors is not None and isinstance(own.anchors[0], int):
+        if own.anchors is not None and own.body_anchors is None and isinstance(own.anchors[0], int):
             raise entries.at("anchors").error("must be points where filaments grow, but are numbers of nodes.")
     for entries, own in zip(tables["pull"], configuration.pulls):
         for number in own.filaments:

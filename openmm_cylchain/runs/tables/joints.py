@@ -11,7 +11,7 @@ from .couplings import PLACE_KEYS, check_place, group_of
 _TANGENT = TableKind(
     "tangent",
     (
-        *(key for key in PLACE_KEYS if key.name != "point"),
+        *(key for key in PLACE_KEYS if key.name not in ("point", "body", "body_point")),
         Key("direction", direction(), None, "One that does not change, in place of a filament."),
     ),
     "Where the tangent of a filament is, towards its last node, or a direction.",

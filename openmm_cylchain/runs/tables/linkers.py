@@ -125,12 +125,24 @@ _HAND_EXAMPLE = '{ binding_rate = "10 1/s", reach = "50 nm", unbinding_rate = "0
 _ANCHOR_REGION = TableKind(
     "anchors",
     (
-        Key("count", Whole(1, 10**7, "1000"), REQUIRED, "How many."),
+        Key("count", Whole(1, 10**7, "1000"), None, "How many."),
         Key("wall", Whole(1, 1000, "1"), None, "Number of the [[wall]] on which they are, from 1 on."),
         Key("lower", point(), None, "Corner of a box that they are in. For a wall, else that of the periodic box."),
         Key("upper", point(), None, "The opposite corner."),
+        Key(
+            "body_table",
+            Whole(1, 1000, "1"),
+            None,
+            "In place of count: number of the [[body]] table on whose bodies they are, from 1 on.",
+        ),
+        Key(
+            "body_points",
+            Listing(Whole(0, None, "0"), "numbers of points", "[1, 2, 3]"),
+            None,
+            "Points of each of these bodies that are anchors; one that is named twice has two.",
+        ),
     ),
-    "Anchors at random places, in a box or on a wall.",
+    "Anchors at random places, in a box or on a wall, or points of bodies.",
 )
 LINKERS = TableKind(
     "linkers",
@@ -187,7 +199,10 @@ _BEFORE_ANCHORS, _BEHIND_ANCHORS = ("count", "concentration", "volume"), ("bound
 
 @dataclass(frozen=True)
 class LinkerGroup:
-    """One [[linkers]] table; lengths in nm, anchors as points or as numbers of particles."""
+    """One [[linkers]] table; lengths in nm, anchors as points or as numbers of particles.
+
+    ``body_anchors`` are the number of a [[body]] table, and points of its bodies: then ``anchors`` are as many zeros.
+    """
 
     kind: Crosslinker
     count: int | None
@@ -199,14 +214,20 @@ class LinkerGroup:
     planar: bool
     region: tuple | None
     keep: str = "all"
+    body_anchors: tuple | None = None
 
 
-def read_linkers(entries, groups, box, seed, walls=()):
+def read_linkers(entries, groups, box, seed, walls=(), bodies=()):
     """The LinkerGroup of a [[linkers]] table, for FilamentGroups; the seed is that of anchors at random places."""
-    anchors = _anchor_points(entries, sum(own.count * own.nodes for own in groups), seed, box, walls)
+    on_bodies = _body_anchors(entries["anchors"], bodies)
+    if on_bodies is None:
+        anchors = _anchor_points(entries, sum(own.count * own.nodes for own in groups), seed, box, walls)
+    else:
+        table, points = on_bodies
+        anchors = (0,) * (bodies[table - 1].count * len(points))
     first, last = (tuple(entries[name] for name in names) for names in (_BEFORE_ANCHORS, _BEHIND_ANCHORS))
     region = None if entries["inside"] is None else Region(entries["inside"]).walls
-    group = LinkerGroup(_kind(entries), *first, anchors, *last, region, entries["keep"])
+    group = LinkerGroup(_kind(entries), *first, anchors, *last, region, entries["keep"], on_bodies)
     with entries.naming():
         as_linkers(group.kind, *first, group.anchors, group.bound, 0, group.diffusion, group.planar, region)
     if group.diffusion is not None:
@@ -345,6 +366,23 @@ def _anchor_points(entries, nodes, seed, box, walls):
             f"must be numbers of nodes between 0 and {nodes - 1}, but are {list(anchors)}."
         )
     return anchors
+
+
+def _body_anchors(entries, bodies):
+    # Of a table, the number of a [[body]] table and points; None if it has none.
+    if not isinstance(entries, Entries) or entries["body_table"] is None:
+        if isinstance(entries, Entries):
+            entries.refuse(("body_points",), "belongs to a body_table.")
+            entries.require("count")
+        return None
+    entries.refuse(("count", "wall", "lower", "upper"), "cannot be with a body_table.")
+    table, points = entries["body_table"], entries["body_points"] or (0,)
+    if table > len(bodies):
+        raise entries.at("body_table").error(f"is {table}, but there are {len(bodies)} [[body]] tables.")
+    there = len(bodies[table - 1].body.points)
+    if max(points) >= there:
+        raise entries.at("body_points").error(f"{max(points)} does not exist; there are {there}, from 0 on.")
+    return table, points
 
 
 def _random_anchors(entries, seed, box, walls):
