@@ -278,7 +278,7 @@ class Run:
     def warn_of_rounding(self) -> None:
         """Warn (PrecisionWarning) of positions that are coarser than thermal fluctuations, see ``load``."""
         widths = [np.sqrt(thermal_energy(self.temperature) / own.type.segment_stiffness) for own in self.filaments]
-        if self.coordinate_resolution > _COARSE * min(widths):
+        if self.coordinate_resolution > _COARSE * min(widths, default=np.inf):
             warnings.warn(
                 f"Positions in {self._files.trajectory} are rounded to {self.coordinate_resolution:.2g} nm, for they "
                 f"are far from the origin, but lengths of segments fluctuate by {min(widths):.2g} nm: shapes that are "

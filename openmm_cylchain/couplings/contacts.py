@@ -363,7 +363,7 @@ def outside_particles(filaments: FilamentCollection, system: openmm.System, part
     count = system.getNumParticles()
     filled = [*filaments.node_indices, *filaments.control_point_indices, filaments.attachment_indices]
     own = set(np.concatenate(filled).tolist())
-    if max(own) >= count:
+    if max(own, default=-1) >= count:
         raise InputError("system is not the System that the filaments were put into: it has too few particles.")
     indices = whole_numbers(particles, 0, "particles")
     for index in indices:

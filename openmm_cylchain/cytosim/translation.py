@@ -256,10 +256,10 @@ class Translation:
 
     def check(self):
         """Raise InputError if there is nothing that a run has."""
-        if not self.made and not self.document.tables_called("[[nucleation]]"):
+        if not (self.made or self.bodies or self.document.tables_called("[[nucleation]]")):
             missing = ", ".join(self.document.missing)
             raise InputError(
-                "there are no fibers in it, and a run of ours has some"
+                "there are neither fibers nor bodies in it, and a run of ours has some"
                 + (f". It would need: {missing}." if missing else ".")
             )
 

@@ -56,7 +56,7 @@ class PlacedFilaments:
     @property
     def nodes(self) -> np.ndarray:
         """Particles of the nodes of all filaments, one after the other, and of the control points of beam elements."""
-        return np.concatenate([*self.node_indices, *self.control_point_indices])
+        return np.concatenate([np.zeros(0, dtype=int), *self.node_indices, *self.control_point_indices])
 
     def particles_of(self, filament: int) -> np.ndarray:
         """Particles of the nodes of a filament and, if it has beam elements, of their control points."""

@@ -274,8 +274,8 @@ def _read_tables(raw):
             tables[kind.name] = [kind.read(found, Place(kind.header, (kind.name,)))]
         if ACTIVE.name in kind.names and kind is not FILAMENT:
             tables[kind.name] = [own for own in tables[kind.name] if own[ACTIVE.name]]
-    if not (tables["filament"] or tables["nucleation"]):
-        raise InputError("There is no [[filament]] table: add one for every kind of filament.")
+    if not (tables["filament"] or tables["nucleation"] or tables["body"]):
+        raise InputError("There is no [[filament]] table: add one for every kind of filament, or a [[body]].")
     return tables
 
 

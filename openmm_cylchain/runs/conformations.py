@@ -3,10 +3,12 @@
 import itertools
 
 import numpy as np
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PatchCollection
+from matplotlib.patches import Circle
 from matplotlib.transforms import ScaledTranslation
 
 from ..analysis.filament_shapes import filament_curves
+from ..filaments.body import BODY_NAME
 from ..mechanics.geometry import unrolled
 from ..output.colors import PLUS_END, PLUS_END_COLOR, colors_of_filaments
 from ..units.text import time_unit
@@ -49,7 +51,16 @@ class Conformations:
         kinds = dict.fromkeys((_kind(group), load) for group, load, _ in self._groups)
         self._colours = dict(zip(kinds, colors_of_filaments(len(kinds))))
         self._springs, self._polar = springs, polar
+        radii = [np.tile(own.body.radii, own.count) for own in configuration.bodies]
+        self._radii = np.concatenate([np.zeros(0), *radii])
+        self._body_points = [atom.index for atom in trajectory.topology.atoms if atom.name == BODY_NAME]
         points = [own[:, :2] for frame in frames for *_, lines in self._lines(frame) for own in lines]
+        points += [
+            places + shift * radius
+            for frame in frames
+            for places, radius in [self._spheres(frame)]
+            for shift in (-1, 1)
+        ]
         points = np.concatenate(points or [np.zeros((1, 2))])
         if self._box is not None:
             points = np.array([np.zeros(2), self._box])
@@ -74,6 +85,7 @@ class Conformations:
             self._draw_segments(axis, segments, self._colours[kind], 1.8, 2, label)
             named.add(kind)
             ends += [] if group.closed else [own[-1, :2] for own in lines]
+        self._draw_spheres(axis, frame)
         if self._polar and ends:
             places = np.array(ends) if self._box is None else np.mod(ends, self._box)
             axis.plot(*places.T, "o", color=PLUS_END_COLOR, markersize=3.5, zorder=3, label=PLUS_END)
@@ -87,11 +99,27 @@ class Conformations:
         time = self._trajectory.time[frame]
         name, length = time_unit(time)
         when = f"at {time / length:.4g} {name.replace('us', 'µs')}" if time > 0.0 else "at the start"
-        axis.set_title(f"Filaments {when}, projected on the xy plane")
+        what = "Filaments" if self._groups else "Bodies"
+        axis.set_title(f"{what} {when}, projected on the xy plane")
         # Below the scale bar and its length, which it would hide in a narrow frame.
         below = axis.transAxes + ScaledTranslation(0.0, -2.4 * FONT_SIZE / 72.0, axis.figure.dpi_scale_trans)
         legend(axis, loc="upper left", bbox_to_anchor=(0.0, -0.01), bbox_transform=below, borderaxespad=0.0)
         _draw_scale_bar(axis)
+
+    def _spheres(self, frame):
+        # Centres (n, 2) in nm and radii (n, 1) of the spheres of bodies.
+        there = self._radii > 0.0
+        places = self._trajectory.xyz[frame, np.array(self._body_points, dtype=int)[there], :2]
+        return places.reshape(-1, 2), self._radii[there][:, None]
+
+    def _draw_spheres(self, axis, frame):
+        places, radii = self._spheres(frame)
+        if self._box is not None:
+            places = np.mod(places, self._box)
+        circles = [Circle(place, float(radius[0])) for place, radius in zip(places, radii)]
+        axis.add_collection(PatchCollection(circles, facecolor="0.8", edgecolor="0.4", zorder=1.5), autolim=False)
+        if circles:
+            axis.plot([], [], "o", color="0.8", markeredgecolor="0.4", label=f"{len(circles)} × spheres of bodies")
 
     def _label(self, kind):
         own = [(group, members) for group, load, members in self._groups if (_kind(group), load) == kind]

@@ -107,6 +107,8 @@ def _draw(configuration, directory, trajectory, network):
             _draw_joint_angles(axes[1, 1], still, temperature, trajectory)
         elif still:
             _draw_segment_lengths(axes[1, 1], still, temperature, trajectory)
+        for axis in axes[1] if not groups else ():
+            axis.set_axis_off()
     if any(grow):
         members, colours = group_members(configuration), [colour for *_, colour in groups]
         draw_growth(axes[2 if own_row else 1], configuration, members, colours, directory)
@@ -233,6 +235,8 @@ def _face_label(wall, number, face):
 
 
 def _draw_energies(axis, groups, temperature, energies):
+    if not groups:
+        return axis.set_axis_off()
     kT = thermal_energy(temperature)
     name, time = _times(energies["time (ms)"])
     kinds = [group for group, *_ in groups]

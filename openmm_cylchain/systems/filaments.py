@@ -156,7 +156,7 @@ class Filaments(TiedFilaments):
             AmoebaGeneralizedKirkwoodForce, ATMForce, and, where particles are in one place, or may be with beads, those
             that divide by all distances.
         """
-        if not self._filaments:
+        if not (self._filaments or self._bodies):
             raise InputError("There are no filaments to add: call add_straight, add_nodes or add_equilibrium first.")
         if self._nodes is not None:
             raise InputError("These filaments are already in a System; make another Filaments for another System.")
@@ -428,5 +428,5 @@ class Filaments(TiedFilaments):
 
     def _refuse_if_not_in(self, system):
         require_kind(system, openmm.System, "system")
-        if system.getNumParticles() <= max(nodes.max() for nodes in self.node_indices):
+        if system.getNumParticles() <= max(own.max() for own in (*self.node_indices, *self.body_indices)):
             raise InputError("This is not the System that the filaments were put into: it has too few particles.")

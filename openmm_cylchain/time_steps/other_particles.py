@@ -14,7 +14,7 @@ def describe_beside_filaments(
 ) -> tuple[IntArray, FloatArray]:
     """Indices and friction coefficients of the mobile particles outside filaments, and of those of rigid bodies behind
     them: the least that each of these has against motion of its own."""
-    bodies = [np.asarray(own, dtype=int) for own in filaments.body_indices]
+    bodies = [np.zeros(0, dtype=int), *(np.asarray(own, dtype=int) for own in filaments.body_indices)]
     inside = np.concatenate([*filaments.node_indices, *filaments.control_point_indices, *bodies])
     others, frictions = describe_other_particles(system, inside, particle_friction)
     of_bodies = [placed.body.place_frictions(filaments.viscosity) for placed in filaments.bodies]

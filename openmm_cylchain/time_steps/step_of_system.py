@@ -37,7 +37,7 @@ def recommended_step_of(
 ) -> TimeStep:
     """The TimeStep of filaments and of the forces of their System; see ``Filaments.recommended_time_step``."""
     check_scheme(scheme)
-    if not len(filaments):
+    if not (len(filaments) or filaments.bodies):
         raise InputError("There are no filaments to recommend a time step for.")
     steps = _steps_of_types(filaments, scheme, temperature, flow)
     if contact_diameter is not None:

@@ -261,7 +261,7 @@ def walls_of_all(walls):
 def check_walls(tables, walls, groups):
     """Raise ConfigurationError for a [[wall]] table that holds no filament of FilamentGroups."""
     for entries, wall in zip(tables, walls):
-        if not any(wall.holds(group.type) for group in groups):
+        if wall.held_types is not None and not any(wall.holds(group.type) for group in groups):
             names = sorted({group.type.name for group in groups})
             raise entries.at("holds").error(
                 f"names {' and '.join(wall.held_types)}, but filaments of the configuration are {', '.join(names)}."

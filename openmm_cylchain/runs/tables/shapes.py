@@ -104,7 +104,7 @@ class Region:
     @property
     def walls(self):
         """Tuple of the Shapes that it is within: a cylinder has a Slab across it."""
-        if self._length is None:
+        if not isinstance(self._shape, Cylinder):
             return (self._shape,)
         return (self._shape, Slab(self._shape.point, self._shape.axis, self._length))
 
