@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 
 using namespace cylchain;
 using namespace std;
@@ -16,8 +15,6 @@ const uint32_t LEVEL_OF_DIFFUSION = 30, LEVEL_OF_RELEASE = 29, LEVEL_OF_ENDS = 2
 const int MOST_TRIES = 100;
 /** Of a word of 32 bits. */
 const double WORD = 0x1p-32;
-
-const double NONE = numeric_limits<double>::quiet_NaN();
 
 } // namespace
 
@@ -145,7 +142,7 @@ void LinkerKinetics::walkOne(LinkerState& state, size_t index, const KineticStep
 /** Where linkers of a state were when chains ended that they held: by the lengths along chains before. */
 void LinkerKinetics::releaseFromEnds(LinkerState& state, const vector<HandPlace>& held, const Contours& before,
         const KineticStep& step) const {
-    state.positions.resize(3*state.linkers.size(), NONE);
+    state.positions.resize(3*state.linkers.size(), NO_POSITION);
     for (size_t i = 0; i < state.linkers.size(); i++) {
         if (!isFree(state.linkers[i]) || !isnan(state.positions[3*i]))
             continue;

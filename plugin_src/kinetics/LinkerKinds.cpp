@@ -2,7 +2,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 
 using namespace cylchain;
 using namespace std;
@@ -11,7 +10,6 @@ namespace {
 
 /** To a linker in a step. */
 const double FEW_PROPOSALS = 0.2;
-const double NONE = numeric_limits<double>::quiet_NaN();
 
 } // namespace
 
@@ -88,7 +86,7 @@ void LinkerKinetics::know(LinkerState& state) {
     known = &state;
     const vector<Linker>& linkers = state.linkers;
     state.clocks.resize(linkers.size(), 0);
-    state.positions.resize(anyDiffuses ? 3*linkers.size() : 0, NONE);
+    state.positions.resize(anyDiffuses ? 3*linkers.size() : 0, NO_POSITION);
     state.events.resize(system.types.size());
     watches.clear();
     taken.clear();

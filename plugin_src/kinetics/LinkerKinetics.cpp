@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
-#include <limits>
 #include <queue>
 
 using namespace cylchain;
@@ -20,8 +19,6 @@ const uint32_t NEW_LINKERS = 0xffffffff;
 
 /** Of a length along a chain. */
 const double ROUNDING = 1e-9;
-
-const double NONE = numeric_limits<double>::quiet_NaN();
 
 uint64_t drawNumber() {
     static atomic<uint64_t> last(0);
@@ -236,7 +233,7 @@ void LinkerKinetics::apply(LinkerState& state, const KineticStep& step, Pending&
         break;
     }
     if (position != nullptr && !isFree(linker))
-        fill(position, position+3, NONE);
+        fill(position, position+3, NO_POSITION);
 }
 
 /**
@@ -292,7 +289,7 @@ void LinkerKinetics::takeTogether(LinkerState& state, const KineticStep& step, C
             linkers.push_back(linker);
             state.clocks.push_back(0);
             if (anyDiffuses)
-                state.positions.insert(state.positions.end(), 3, NONE);
+                state.positions.insert(state.positions.end(), 3, NO_POSITION);
             watches.push_back(watch(linker));
             add(linkers.size()-1, next.time);
         }

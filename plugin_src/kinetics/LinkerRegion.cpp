@@ -9,7 +9,7 @@ using namespace std;
 
 namespace {
 
-const int MOST_TRIES = 1000000;
+const int MOST_POSITIONS = 1000000;
 /** The level of noise to which first positions belong: the events of linkers are at level 0. */
 const uint32_t LEVEL_OF_FIRST_POSITIONS = 31;
 
@@ -41,7 +41,7 @@ bool LinkerRegion::draw(RandomNumbers& random, bool planar, double* position) co
             for (int k = 0; k < 3; k++)
                 origin[k] = walls[0].point[k]-0.5*(edges[k]+edges[3+k]+edges[6+k]);
     }
-    for (int i = 0; i < MOST_TRIES; i++) {
+    for (int i = 0; i < MOST_POSITIONS; i++) {
         copy(origin, origin+3, position);
         for (int axis = 0; axis < 3; axis++) {
             const double share = random.uniform();

@@ -6,6 +6,7 @@
 #include "mechanics/ChainList.h"
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace cylchain {
@@ -161,6 +162,9 @@ struct KnownTo {
         return *this;
     }
 };
+
+/** The coordinates of linkers that have no position. */
+const double NO_POSITION = std::numeric_limits<double>::quiet_NaN();
 
 /** All that changes while linkers bind and unbind. */
 struct LinkerState {

@@ -81,7 +81,7 @@ void BodyEquations::findCompliance(const double* inverse, const double* arm, dou
         }
 }
 
-void BodyEquations::invert(const double* matrix, double* inverse) {
+void BodyEquations::invertSix(const double* matrix, double* inverse) {
     const int n = 6;
     double rest[n*n];
     copy_n(matrix, n*n, rest);
@@ -104,7 +104,7 @@ void BodyEquations::invert(const double* matrix, double* inverse) {
     }
 }
 
-void BodyEquations::invert(const double* matrix, bool planar, bool turns, double* inverse) {
+void BodyEquations::invertSix(const double* matrix, bool planar, bool turns, double* inverse) {
     bool fixed[6] = {};
     for (int i : ACROSS_PLANE)
         fixed[i] = planar;
@@ -114,7 +114,7 @@ void BodyEquations::invert(const double* matrix, bool planar, bool turns, double
     for (int i = 0; i < 6; i++)
         for (int j = 0; j < 6; j++)
             reduced[6*i+j] = !fixed[i] && !fixed[j] ? matrix[6*i+j] : i == j;
-    invert(reduced, inverse);
+    invertSix(reduced, inverse);
     for (int i = 0; i < 6; i++)
         if (fixed[i])
             inverse[7*i] = 0;

@@ -21,14 +21,14 @@ void addStiffness(const double* stiffness, const double* arm, double* matrix);
 /** Find how a force on a place moves it, by the inverse of the equations. */
 void findCompliance(const double* inverse, const double* arm, double* compliance);
 /** The inverse of a symmetric, positive definite matrix. */
-void invert(const double* matrix, double* inverse);
+void invertSix(const double* matrix, double* inverse);
 /**
  * The same where some unknowns may be none: rows and columns of zeros.
  *
  * @param planar  whether the body moves in a plane of constant z alone, and turns about z alone
  * @param turns   whether it turns
  */
-void invert(const double* matrix, bool planar, bool turns, double* inverse);
+void invertSix(const double* matrix, bool planar, bool turns, double* inverse);
 /** Find the product with a vector of six numbers. */
 void multiplySix(const double* matrix, const double* vector, double* result);
 

@@ -17,10 +17,10 @@ const double LEAST_WORK = 1e-5;
 /** Without noise, as if k_B T were this much, in kJ/mol. */
 const double COLD = 1e-3;
 /** The largest turn of an iteration, and that of a step in which something holds a body off its centre, in rad. */
-const double LARGEST_TURN_OF_ITERATION = 1, LARGEST_TURN = 6;
+const double LARGEST_TURN_OF_ITERATION = 1, LARGEST_TURN_OF_STEP = 6;
 const double UNITY[] = {1, 0, 0, 1, 0, 1};
 /** Of forces on places: what less of them does to a body is lost. */
-const double LEAST_SHARE = 1e-12;
+const double LEAST_SHARE_OF_FORCES = 1e-12;
 
 /** Add the products of a force with its place in the frame of the body, row by row. */
 void addProducts(const double* force, const double* place, double* products) {
@@ -193,7 +193,7 @@ void BodyStep::eliminate(const CouplingTerm* newTerms, int count, double* moves)
     }
     for (int i : going) {
         State& body = states[i];
-        invert(body.matrix, bodies[i].planar, body.held, body.inverse);
+        invertSix(body.matrix, bodies[i].planar, body.held, body.inverse);
         multiplySix(body.inverse, &right[6*i], body.change);
     }
     gatherMoves(moves);
@@ -234,7 +234,7 @@ void BodyStep::turnFreely(const RigidBody& own, State& body) const {
     addBlock(UNITY, 1, 0, matrix);
     addBlock(friction, 1/settings.stepSize, 3, matrix);
     copy_n(torque, 3, all+3);
-    invert(matrix, own.planar, true, inverse);
+    invertSix(matrix, own.planar, true, inverse);
     multiplySix(inverse, all, vector);
     for (int k = own.planar ? 2 : 0; k < 3; k++)
         vector[3+k] += body.spin[k];
@@ -262,8 +262,8 @@ void BodyStep::findProjections() {
         const double lengths[] = {own[0], own[21]+own[28]+own[35]};
         copy_n(own, 36, regular);
         for (int k = 0; k < 6; k++)
-            regular[7*k] += LEAST_SHARE*(lengths[k/3]+(lengths[k/3] > 0 ? 0 : 1));
-        invert(regular, own);
+            regular[7*k] += LEAST_SHARE_OF_FORCES*(lengths[k/3]+(lengths[k/3] > 0 ? 0 : 1));
+        invertSix(regular, own);
     }
 }
 
@@ -313,7 +313,7 @@ void BodyStep::findMetricTorques() {
     }
     for (int i : going) {
         double inverse[36];
-        invert(&matrices[36*i], bodies[i].planar, states[i].held, inverse);
+        invertSix(&matrices[36*i], bodies[i].planar, states[i].held, inverse);
         copy_n(inverse, 36, &matrices[36*i]);
     }
     for (size_t i = 0; i < joints.size(); i++) {
@@ -431,7 +431,7 @@ void BodyStep::findExcessiveChanges(bool* failed) const {
         const State& body = states[i];
         const double turn = dot(body.turned, body.turned);
         failed[i] = !isfinite(dot(body.moved, body.moved)) || !isfinite(turn) ||
-                (body.held && turn > LARGEST_TURN*LARGEST_TURN);
+                (body.held && turn > LARGEST_TURN_OF_STEP*LARGEST_TURN_OF_STEP);
     }
 }
 
