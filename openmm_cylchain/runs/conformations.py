@@ -116,10 +116,11 @@ class Conformations:
         places, radii = self._spheres(frame)
         if self._box is not None:
             places = np.mod(places, self._box)
+        if not len(places):
+            return
         circles = [Circle(place, float(radius[0])) for place, radius in zip(places, radii)]
         axis.add_collection(PatchCollection(circles, facecolor="0.8", edgecolor="0.4", zorder=1.5), autolim=False)
-        if circles:
-            axis.plot([], [], "o", color="0.8", markeredgecolor="0.4", label=f"{len(circles)} × spheres of bodies")
+        axis.plot([], [], "o", color="0.8", markeredgecolor="0.4", label=f"{len(circles)} × spheres of bodies")
 
     def _label(self, kind):
         own = [(group, members) for group, load, members in self._groups if (_kind(group), load) == kind]

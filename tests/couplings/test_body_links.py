@@ -86,7 +86,8 @@ def _monte_carlo(radius, stiffness, rest, copies, moves):
     return np.mean(found, axis=(0, 2))
 
 
-@pytest.mark.parametrize("step", [0.3, pytest.param(3.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [0.3, 3.0])
 def test_two_spheres_on_a_spring(step):
     """A spring of a rest length between points on two spheres, beside Monte Carlo."""
     radius, rest, copies = 30.0, 20.0, 300
@@ -154,7 +155,7 @@ def test_aster_in_a_trap(step):
     _check_mean(squares[10:], 3 * KT / trap, 0.35)
 
 
-@pytest.mark.parametrize("step", [10.0, 300.0])
+@pytest.mark.parametrize("step", [pytest.param(10.0, marks=pytest.mark.slow), 300.0])
 def test_sphere_in_a_spherical_wall(step):
     """The distance of a sphere from the middle of a soft wall around it, beside quadrature."""
     radius, room, stiffness, copies = 50.0, 150.0, 0.1, 300

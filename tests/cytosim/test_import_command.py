@@ -127,7 +127,7 @@ def test_outputs_are_never_overwritten(tmp_path, capsys):
         ),
         (NETWORK.replace("hand2 = myosin", "hand2 = nobody"), r"my\.cym, line 25: there is no hand called 'nobody'"),
         (NETWORK.replace("new 8 actin", "new 8 actn"), r"my\.cym, line 32: nothing called 'actn' has been set"),
-        (NETWORK.replace("new 8 actin { length = 2 }", ""), r"my\.cym: there are no fibers in it"),
+        (NETWORK.replace("new 8 actin { length = 2 }", ""), r"my\.cym: there are neither fibers nor bodies in it"),
         (NETWORK.replace("    time_step = 0.005\n", ""), r"time_step of simul must be given"),
         (NETWORK.replace("viscosity = 0.1", "viscosity = -1"), r"line 5: viscosity of simul must be positive"),
         (NETWORK + "new actin {", r"line 35: \"{\" has no \"}\" that closes it"),
