@@ -83,8 +83,10 @@ static void testRandomWalks() {
     for (bool planar : {false, true}) {
         LinkerSystem system = diffusing(twoHands(0.02, 0, 5, 5, 0), 3);
         system.types[0].planar = planar;
-        for (Hand& hand : system.hands)
+        for (Hand& hand : system.hands) {
             hand.bindingRate = 0;
+            hand.chains = {0};
+        }
         const KineticStep step = stepOf(rods.x, 2, box);
         LinkerKinetics kinetics(system, rods.chains);
         LinkerState state = placed(freeLinkers(count), system, step);
