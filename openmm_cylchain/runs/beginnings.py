@@ -5,7 +5,10 @@ from pathlib import Path
 
 from ..errors import InputError
 
-START_NAMES = ("network", "bundle", "gliding", "treadmilling", "microtubules", "stages", "dna", "force-extension")
+START_NAMES = (
+    *("network", "bundle", "gliding", "treadmilling", "microtubules", "aster", "stages"),
+    *("dna", "force-extension"),
+)
 
 
 def start_text(kind):

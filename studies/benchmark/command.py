@@ -44,11 +44,16 @@ def add_command(commands):
         "turnover", help="filaments that grow, begin, vanish and are cut, with linkers: 10 000 segments, some minutes"
     )
     turnover.set_defaults(command=_benchmark_turnover)
+    spindle = benchmarks.add_parser(
+        "spindle", help="200 microtubules that turn over in a plane, 6000 kinesin-5 and 3000 dynein, some minutes"
+    )
+    spindle.set_defaults(command=_benchmark_spindle)
     platforms = benchmarks.add_parser(
         "platforms", help="filaments, alone and among particles, on each platform and in each precision, many minutes"
     )
     platforms.set_defaults(command=_benchmark_platforms)
-    for benchmark in (engines, scaling, time_step, bead_spring, base_pairs, networks, kinetics, turnover, platforms):
+    of_networks = (networks, kinetics, turnover, spindle, platforms)
+    for benchmark in (engines, scaling, time_step, bead_spring, base_pairs, *of_networks):
         benchmark.add_argument("--quick", action="store_true", help="a rough measurement within a minute")
         benchmark.add_argument("--json", metavar="FILE", help="write machine, settings and results to FILE as well")
 
@@ -112,6 +117,12 @@ def _benchmark_turnover(options):
     from .turnover import FULL, QUICK, benchmark_turnover
 
     _benchmark(options, lambda say: benchmark_turnover(QUICK if options.quick else FULL, say=say))
+
+
+def _benchmark_spindle(options):
+    from .spindle import FULL, QUICK, benchmark_spindle
+
+    _benchmark(options, lambda say: benchmark_spindle(QUICK if options.quick else FULL, say))
 
 
 def _benchmark_platforms(options):
