@@ -45,7 +45,7 @@ SEGMENTS = 2
 STEP = 2 * unit.millisecond
 STEPS = 30000
 FRAMES = 100
-VISCOSITY = 0.1 * unit.pascal * unit.second
+VISCOSITY = 0.03 * unit.pascal * unit.second
 TEMPERATURE = 310 * unit.kelvin
 NEWTONS = unit.piconewton / unit.nanometer
 GROWS, STAYS = "#0072B2", "#D55E00"
@@ -65,8 +65,8 @@ growth = Growth(
     longest=2.2 * RADIUS,
     minus_capped=True,
     plus_instability=DynamicInstability(
-        catastrophe_rate=0.03 / unit.second,
-        blocked_catastrophe_rate=0.4 / unit.second,
+        catastrophe_rate=0.08 / unit.second,
+        blocked_catastrophe_rate=0.25 / unit.second,
         rescue_rate=0.3 / unit.second,
         shrinking_off_rate=60 / unit.second,
     ),
@@ -126,14 +126,15 @@ def shapes():
 
 
 begin = shapes()
-course, lengths = [np.linalg.norm(begin[1], axis=1)], []
+course, lengths = [begin[1]], []
 for _ in range(steps // interval):
     simulation.step(interval)
     end = shapes()
-    course.append(np.linalg.norm(end[1], axis=1))
+    course.append(end[1])
     lengths.append(here.growth().lengths._value[: CELLS * MICROTUBULES].mean() / 1000)
 time = interval * STEP.value_in_unit(unit.second) * np.arange(len(course))
-course = np.array(course)
+# How far from the middle poles are, along the line on which they begin.
+course = np.einsum("tci,ci->tc", course, begin[1] / np.linalg.norm(begin[1], axis=1)[:, None])
 mean = {True: course[:, :CELLS].mean(axis=1), False: course[:, CELLS:].mean(axis=1)}
 error = {
     True: course[:, :CELLS].std(axis=1, ddof=1) / np.sqrt(CELLS),
@@ -144,7 +145,7 @@ print(f"{steps} steps of {STEP}, {100 * divided:.2g} % of them divided; {time[-1
 for grows, text in ((True, "grow and shrink"), (False, "keep their lengths")):
     print(
         f"where microtubules {text}, the poles are {mean[grows][-1]:.2f} +- {error[grows][-1]:.2f} um "
-        f"from the middle, at first {mean[grows][0]:.2f} um"
+        f"from the middle along the line on which they began, at first {mean[grows][0]:.2f} um"
     )
 print(f"those that grow are {lengths[-1]:.2f} um long in the mean, at first {SEGMENTS * SEGMENT / 1000:.2f} um")
 
@@ -165,7 +166,8 @@ for grows, colour, text in ((True, GROWS, "grow and shrink"), (False, STAYS, "ke
     panel.plot(time, own, color=colour, linewidth=0.8, alpha=0.45)
     panel.plot(time, mean[grows], color=colour, linewidth=2.2, label=f"microtubules {text}")
     panel.fill_between(time, mean[grows] - error[grows], mean[grows] + error[grows], color=colour, alpha=0.25)
-panel.set(xlabel="time (s)", ylabel="pole from the middle (µm)", xlim=(0, time[-1]), ylim=(0, None))
+panel.set(xlabel="time (s)", ylabel="pole from the middle, along its first direction (µm)", xlim=(0, time[-1]))
+panel.axhline(0, color="0.6", linewidth=1)
 panel.legend(frameon=False, loc="lower left")
 panel.spines[["top", "right"]].set_visible(False)
 figure.savefig(folder / "aster.png", dpi=90)
