@@ -170,5 +170,5 @@ panel.set(xlabel="time (s)", ylabel="pole from the middle, along its first direc
 panel.axhline(0, color="0.6", linewidth=1)
 panel.legend(frameon=False, loc="lower left")
 panel.spines[["top", "right"]].set_visible(False)
-figure.savefig(folder / "aster.png", dpi=90)
+figure.savefig(folder / "aster.png", dpi=110)
 print(f"Wrote aster.cif, aster.dcd and aster.png to {folder}.")

@@ -147,5 +147,5 @@ moduli.set(xscale="log", yscale="log", xlabel="angular frequency (1/s)", ylabel=
 for axes in (panel, moduli):
     axes.legend(frameon=False)
     axes.spines[["top", "right"]].set_visible(False)
-figure.savefig(folder / "microrheology.png", dpi=90)
+figure.savefig(folder / "microrheology.png", dpi=110)
 print(f"Wrote microrheology.cif, microrheology.dcd and microrheology.png to {folder}.")
