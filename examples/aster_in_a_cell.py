@@ -3,8 +3,9 @@
 A pole, which is a rigid body, holds the minus ends of microtubules, and keeps them radial. Their plus ends turn from
 growth to shrinking at catastrophes, and back. At the wall they push, grow more slowly, and turn more often. More of
 them reach the wall where it is near, so the pole moves to the middle, as in chambers of glass (Holy, Dogterom, Yurke,
-Leibler, PNAS 1997, 94, 6228). The cells are in one System: in half of them, microtubules keep their lengths, and poles
-only diffuse. Speeds and rates are of the order of those in cells.
+Leibler, PNAS 1997, 94, 6228). There it wanders by about 1 um, since few of them push at a time. The cells are in one
+System: in half of them, microtubules keep their lengths, and poles only diffuse. Speeds and rates are of the order of
+those in cells.
 
     python aster_in_a_cell.py [folder] [steps]
 """
@@ -142,10 +143,11 @@ error = {
 }
 divided = integrator.getNumDividedSteps() / (len(filaments) * steps)
 print(f"{steps} steps of {STEP}, {100 * divided:.2g} % of them divided; {time[-1]:.3g} s in {2 * CELLS} cells")
-for grows, text in ((True, "grow and shrink"), (False, "keep their lengths")):
+for own, text in ((course[:, :CELLS], "grow and shrink"), (course[:, CELLS:], "keep their lengths")):
+    late = own[len(own) // 2 :].mean(axis=0)
     print(
-        f"where microtubules {text}, the poles are {mean[grows][-1]:.2f} +- {error[grows][-1]:.2f} um "
-        f"from the middle along the line on which they began, at first {mean[grows][0]:.2f} um"
+        f"where microtubules {text}, poles are {late.mean():.2f} +- {late.std(ddof=1) / np.sqrt(CELLS):.2f} um from "
+        f"the middle in the second half, along the line on which they begin, at first {own[0].mean():.2f} um"
     )
 print(f"those that grow are {lengths[-1]:.2f} um long in the mean, at first {SEGMENTS * SEGMENT / 1000:.2f} um")
 
