@@ -41,7 +41,7 @@ class SpindleEffort:
     piece: float
 
 
-FULL = SpindleEffort(60.0, 7, 5.0)
+FULL = SpindleEffort(60.0, 7, 3.0)
 QUICK = SpindleEffort(5.0, 3, 1.0)
 
 
