@@ -30,9 +30,19 @@ static Wall wallOf(WallShape shape, const double* point, const double* vector, d
     return wall;
 }
 
-static void checkDiffusing(const Rods& rods, const LinkerSystem& system, double stepSize, const double* box,
+/** Let all hands bind to all rods that there are, and to no others. */
+static void bindToAll(const Rods& rods, LinkerSystem& system) {
+    for (Hand& hand : system.hands) {
+        hand.chains.clear();
+        for (int chain = 0; chain < rods.chains.size(); chain++)
+            hand.chains.push_back(chain);
+    }
+}
+
+static void checkDiffusing(const Rods& rods, LinkerSystem system, double stepSize, const double* box,
         double volume) {
     const KineticStep step = stepOf(rods.x, stepSize, box);
+    bindToAll(rods, system);
     LinkerKinetics kinetics(system, rods.chains);
     LinkerState state = placed(freeLinkers(2000), system, step);
     // They have to come there.
@@ -83,11 +93,10 @@ static void testRandomWalks() {
     for (bool planar : {false, true}) {
         LinkerSystem system = diffusing(twoHands(0.02, 0, 5, 5, 0), 3);
         system.types[0].planar = planar;
-        for (Hand& hand : system.hands) {
+        for (Hand& hand : system.hands)
             hand.bindingRate = 0;
-            hand.chains = {0};
-        }
         const KineticStep step = stepOf(rods.x, 2, box);
+        bindToAll(rods, system);
         LinkerKinetics kinetics(system, rods.chains);
         LinkerState state = placed(freeLinkers(count), system, step);
         const vector<double> before = state.positions;
@@ -115,9 +124,10 @@ static void testUniformDensity() {
     rods.add(a, ALONG_X, 2, 50);
     const double center[] = {0, 0, 0}, zero[] = {0, 0, 1}, radius = 100;
     for (double size : {0.1, 2.0}) {
-        const LinkerSystem system = diffusing(twoHands(0.05, 0, 30, 30, 0), 2e3,
+        LinkerSystem system = diffusing(twoHands(0.05, 0, 30, 30, 0), 2e3,
                 {wallOf(WallShape::Sphere, center, zero, radius)});
         const KineticStep step = stepOf(rods.x, size);
+        bindToAll(rods, system);
         LinkerKinetics kinetics(system, rods.chains);
         LinkerState state = placed(freeLinkers(4000), system, step);
         for (int i = 0; i < 100/size; i++)
@@ -198,6 +208,7 @@ static void testDepletion() {
     }
     const double box[] = {500, 0, 0, 0, 500, 0, 0, 0, 300};
     const KineticStep step = stepOf(rods.x, stepSize, box);
+    bindToAll(rods, system);
     LinkerKinetics kinetics(system, rods.chains);
     const int count = 10000, steps = 1500;
     LinkerState state = placed(freeLinkers(count), system, step);
