@@ -216,3 +216,19 @@ def test_singles_have_bases_on_bodies(tmp_path):
 def test_what_bodies_cannot_do_here_is_said(tmp_path, text, missing):
     _, document = translated(tmp_path, text)
     assert any(own.startswith(missing) for own in document.missing), document.missing
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "sphere1 = 0 0 0, 1, 12 {}",
+        "point1 = 0 0 0, 1, {} each",
+        "point1 = 0 0 0, 1; single1 = {}, point1",
+        "ball1 = 0 0 0, 1, {}",
+    ],
+)
+@pytest.mark.parametrize("name", ["protein", "tube", "dynein"])
+def test_what_is_no_single_is_left_out_in_words(tmp_path, place, name):
+    found, document = translated(tmp_path, f"new 1 core {{ {place.format(name)} }}\n")
+    assert len(found.bodies) == 1 and not found.linkers
+    assert any("what is attached to them" in str(own) for own in document.missing)
