@@ -185,9 +185,7 @@ def _add_sphere(translation, options, key, shape, draw):
     shape.groups[key] = shape.groups[key.replace("sphere", "point").replace("ball", "point")] = [number]
     inside = key.startswith("ball")
     for text in options.values(key)[2:]:
-        count, name, where = _single(text)
-        if name is None:
-            continue
+        count, name, where = _single_of(translation, options, key, text)
         for _ in range(count):
             if where:
                 place = _local(translation, options, key, where, draw)
@@ -202,26 +200,31 @@ def _add_interpolated(translation, options, shape):
         key = f"single{number}"
         if key not in options:
             return
-        count, name, _ = _single(options.text(key, default=""))
+        count, name, _ = _single_of(translation, options, key, options.text(key, default=""))
         ends = [shape.groups.get(options.text((key, own), default="point1"), [0])[0] for own in (1, 2)]
         if options.text((key, 2)) is None:
             ends[1] = ends[0]
         share = options.number((key, 3), default=0.0)
         place = (1.0 - share) * shape.points[ends[0]] + share * shape.points[ends[1]]
-        shape.hold(name, [shape.add(place)] * count)
+        if count:
+            shape.hold(name, [shape.add(place)] * count)
 
 
-def _single(text):
-    # How many, the name of a single and what stands behind it.
+def _single_of(translation, options, key, text):
+    # How many, the name of a single and what stands behind it; none if there is no such single.
     words = _ONE_SINGLE.fullmatch(text.strip().removeprefix("(").removesuffix(")").strip())
-    return (0, None, "") if words is None else (int(words[1] or 1), words[2], words[3].strip())
+    found = None if words is None else translation.script.properties.get(words[2])
+    if found is None or found.kind != "single":
+        translation.left_out(f"{text!r} of {key}", options.line_of(key), "bodies: what is attached to them")
+        return 0, None, ""
+    return int(words[1] or 1), words[2], words[3].strip()
 
 
 def _hold(translation, options, key, text, shape, numbers, draw):
-    count, name, rest = _single(text)
-    if name is None or name not in translation.script.properties:
-        translation.left_out(f"{text!r} of {key}", options.line_of(key), "bodies: what is attached to them")
-    elif rest == "each":
+    count, name, rest = _single_of(translation, options, key, text)
+    if name is None:
+        return
+    if rest == "each":
         shape.hold(name, [number for number in numbers for _ in range(count)])
     else:
         chosen = draw.generator.integers(0, len(numbers), count)

@@ -32,6 +32,7 @@ _PLACEMENT = ("orientation", "direction", "position", "reference", "placement", 
 _OFF_PLACE = ("off", "outside", "surface")
 _PARTS, _MOST_PARTS = 20, 2000
 _MOST_SEGMENTS = 5_000_000
+_MOST_FIBERS = 1_000_000
 
 
 @dataclass
@@ -231,6 +232,8 @@ def _start(translation, fiber, options, length, growing, note=None):
 
 def _finish(translation, table, fiber, length, segment, segments, count, growing):
     first = translation.filament_count
+    if count > _MOST_FIBERS:
+        raise ScriptError(fiber.line, f"{count} {fiber.name} are more than {_MOST_FIBERS}, the most of one new.")
     translation.filament_count += count
     translation.made += [Made(fiber.name, first + own, length, growing is not None) for own in range(count)]
     # In either order: a vector and an end.

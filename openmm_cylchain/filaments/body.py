@@ -91,7 +91,11 @@ class Body:
         name : str
         """
         size = positive(radius, LENGTH, f"{name}: radius")
-        places = np.asarray(in_units_of(points, LENGTH, f"{name}: points"), dtype=float).reshape(-1, 3)
+        places = np.asarray(in_units_of(points, LENGTH, f"{name}: points"), dtype=float)
+        if not places.size:
+            places = np.zeros((0, 3))
+        if places.ndim != 2 or places.shape[1] != 3:
+            raise InputError(f"{name}: points must have the shape (n, 3), but have {places.shape}.")
         return cls(np.concatenate([np.zeros((1, 3)), places]), np.r_[size, np.zeros(len(places))], name)
 
     @property
@@ -153,7 +157,10 @@ def place_body(body: Body, position: Vector, orientation: Vectors | None, planar
     """A Body with the origin of its frame at a position, its axes turned as a rotation matrix says."""
     require_kind(body, Body, f"{label}: body")
     origin = np.array([float(x) for x in vector(position, LENGTH, f"{label}: position")])
-    rotation = np.eye(3) if orientation is None else np.asarray(orientation, dtype=float)
+    try:
+        rotation = np.eye(3) if orientation is None else np.asarray(orientation, dtype=float)
+    except (TypeError, ValueError):
+        rotation = np.zeros(0)
     if (
         rotation.shape != (3, 3)
         or not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6)

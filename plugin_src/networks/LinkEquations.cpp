@@ -30,6 +30,8 @@ const double TOLERANCE_OF_ONE_SIDE = 0.05;
 const double OF_CHANGE = 1e-3, OF_CHANGE_WITH_NOISE = 1e-5, OF_LENGTH = 1e-7;
 /** What rounding may leave of a change, over the largest coordinate; without noise, nothing else is left. */
 const double OF_ROUNDING = 1e-11;
+/** A place is rounded as are those of what it is on, in nm, also where it is at the origin itself. */
+const double LEAST_COORDINATE = 100;
 /** The least length for metric forces, over the rest length. */
 const double LEAST_LENGTH = 0.05;
 /** The largest stiffness of a link that has a direction, or is beside gaps, over the friction of a place in a step. */
@@ -61,7 +63,7 @@ bool turns(const Link& link) {
 
 /** The largest coordinate of the particles of a link. */
 double largestCoordinate(const Link& link, const double* positions) {
-    double largest = 0;
+    double largest = LEAST_COORDINATE;
     for (const Place& place : {link.first, link.second})
         for (int particle : {place.first, place.second})
             for (int k = 0; k < 3 && particle >= 0; k++)

@@ -155,6 +155,21 @@ def test_aster_in_a_trap(step):
     _check_mean(squares[10:], 3 * KT / trap, 0.35)
 
 
+@pytest.mark.parametrize("planar", [False, True])
+@pytest.mark.parametrize(("stiffness", "step"), [(1e4, 1e9), (1.0, 1e9), (0.01, 1e11)])
+def test_without_noise_they_rest_where_links_are_at_rest(planar, stiffness, step):
+    """Two links to where their places are, one of them at the origin, whose coordinates round to nothing."""
+    filaments = Filaments(VISCOSITY, 0.0)
+    filaments.add_body(Body.sphere(100, [[100, 0, 0]]), [0, 0, 0], planar=planar)
+    _, system, positions = filaments.build()
+    links = Crosslinks(stiffness, 0.0)
+    links.add_many(None, [(0, (0.0, 0.0, 0.0)), (1, (0.0, 100.0, 0.0))])
+    links.add_to(system)
+    context = new_context(system, positions, filaments.create_integrator(system, step, checks=False), "CPU")
+    context.getIntegrator().step(300)
+    np.testing.assert_allclose(positions_of(context)[:2], [[0, 0, 0], [0, 100, 0]], atol=1e-6)
+
+
 @pytest.mark.parametrize("step", [pytest.param(10.0, marks=pytest.mark.slow), 300.0])
 def test_sphere_in_a_spherical_wall(step):
     """The distance of a sphere from the middle of a soft wall around it, beside quadrature."""

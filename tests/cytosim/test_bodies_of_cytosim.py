@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from openmm_cylchain import InputError
 from openmm_cylchain.cytosim.command import import_file
 from openmm_cylchain.cytosim.translation import translate
 from openmm_cylchain.runs.configuration import read_configuration
@@ -216,3 +217,25 @@ def test_singles_have_bases_on_bodies(tmp_path):
 def test_what_bodies_cannot_do_here_is_said(tmp_path, text, missing):
     _, document = translated(tmp_path, text)
     assert any(own.startswith(missing) for own in document.missing), document.missing
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "sphere1 = 0 0 0, 1, 12 {}",
+        "point1 = 0 0 0, 1, {} each",
+        "point1 = 0 0 0, 1; single1 = {}, point1",
+        "ball1 = 0 0 0, 1, {}",
+    ],
+)
+@pytest.mark.parametrize("name", ["protein", "tube", "dynein"])
+def test_what_is_no_single_is_left_out_in_words(tmp_path, place, name):
+    found, document = translated(tmp_path, f"new 1 core {{ {place.format(name)} }}\n")
+    assert len(found.bodies) == 1 and not found.linkers
+    assert any("what is attached to them" in str(own) for own in document.missing)
+
+
+def test_asters_of_too_many_fibers_are_refused_at_once(tmp_path):
+    text = "new star { solid = core; radius = 0.6, 0.2; fibers = 1000000000, tube, ( length = 1; ) }\n"
+    with pytest.raises(InputError, match="1000000000 tube are more than 1000000"):
+        translated(tmp_path, text)

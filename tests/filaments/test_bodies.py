@@ -72,6 +72,12 @@ def test_what_is_no_body(points, radii, message):
         Body(points, radii)
 
 
+@pytest.mark.parametrize("points", [[1, 2, 3], [[1, 2]], [1, 2, 3, 4, 5, 6], [[1, 2, 3, 4]] * 3])
+def test_places_on_a_sphere_are_of_the_shape_of_points(points):
+    with pytest.raises(InputError, match="shape"):
+        Body.sphere(10, points)
+
+
 def test_what_is_refused():
     body = Body.sphere(10)
     filaments = Filaments(VISCOSITY, TEMPERATURE)
@@ -79,7 +85,7 @@ def test_what_is_refused():
         filaments.add_body("sphere", [0, 0, 0])
     with pytest.raises(InputError, match="position"):
         filaments.add_body(body, [0, 0])
-    for orientation in (np.zeros((3, 3)), -np.eye(3), np.eye(2)):
+    for orientation in (np.zeros((3, 3)), -np.eye(3), np.eye(2), "x", [[1, 2], [3]]):
         with pytest.raises(InputError, match="rotation matrix"):
             filaments.add_body(body, [0, 0, 0], orientation)
     with pytest.raises(InputError, match="portable engine has no rigid bodies"):
