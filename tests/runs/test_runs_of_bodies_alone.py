@@ -48,6 +48,11 @@ def test_a_run_of_bodies_alone(tmp_path):
     assert json.loads((tmp_path / "out" / "summary.json").read_text())
 
 
+def test_bodies_alone_are_not_planar():
+    assert not parse_configuration(BALLS).bodies[0].planar
+    assert parse_configuration(BALLS.replace('name = "BALL"', "planar = true")).bodies[0].planar
+
+
 def test_something_must_be_there():
     text = BALLS.replace("[[body]]", "[[particles]]")
     with pytest.raises(InputError):

@@ -207,7 +207,7 @@ def read_body(entries, tables, groups, box, seed):
         if box is None:
             entries.require("inside")
     planes = [group.planar for group in groups]
-    planar = all(planes) if entries["planar"] is None else entries["planar"]
+    planar = bool(planes) and all(planes) if entries["planar"] is None else entries["planar"]
     if planar and entries["direction"] is not None and entries["direction"][2] != 0.0:
         raise entries.at("direction").error("must lie in the xy plane, because these bodies are planar.")
     count = entries["count"] if entries["positions"] is None else len(entries["positions"])
