@@ -244,10 +244,9 @@ def _add_chain(force, filament, nodes, viscosity, temperature):
 
 
 def _add_body(force, placed, particles, viscosity):
-    body, turn = placed.body, np.eye(3)
-    if placed.planar:
-        # In a frame that is not tilted, it turns about z.
-        turn = placed.rotation
+    body = placed.body
+    # In a frame that is not tilted, planar ones turn about z.
+    turn = placed.rotation if placed.planar else np.eye(3)
     rotational = turn @ body.rotational_friction(viscosity) @ turn.T
     force.addBody(
         [int(particle) for particle in particles],

@@ -12,12 +12,6 @@ namespace {
 /** Corners that span less than this of the square of a body's size are on one line. */
 const double LEAST_AREA = 1e-6;
 
-void cross(const double* a, const double* b, double* result) {
-    result[0] = a[1]*b[2]-a[2]*b[1];
-    result[1] = a[2]*b[0]-a[0]*b[2];
-    result[2] = a[0]*b[1]-a[1]*b[0];
-}
-
 void subtract(const double* a, const double* b, double* result) {
     for (int k = 0; k < 3; k++)
         result[k] = a[k]-b[k];

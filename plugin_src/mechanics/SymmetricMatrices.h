@@ -10,6 +10,13 @@ inline double dot(const double* a, const double* b) {
     return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
 }
 
+/** Find the product a x b. */
+inline void cross(const double* a, const double* b, double* result) {
+    result[0] = a[1]*b[2]-a[2]*b[1];
+    result[1] = a[2]*b[0]-a[0]*b[2];
+    result[2] = a[0]*b[1]-a[1]*b[0];
+}
+
 /** Find the product with a vector. */
 template <class Number> inline void multiply(const Number* m, const Number* v, Number* result) {
     result[0] = m[0]*v[0]+m[1]*v[1]+m[2]*v[2];

@@ -10,12 +10,6 @@ namespace {
 /** Of a planar body: it neither moves across its plane nor turns about directions in it. */
 const int ACROSS_PLANE[] = {2, 3, 4};
 
-void cross(const double* a, const double* b, double* result) {
-    result[0] = a[1]*b[2]-a[2]*b[1];
-    result[1] = a[2]*b[0]-a[0]*b[2];
-    result[2] = a[0]*b[1]-a[1]*b[0];
-}
-
 /** How far a place moves by each of the six unknowns. */
 struct PlaceMoves {
     double moves[6][3];

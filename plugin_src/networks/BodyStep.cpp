@@ -60,7 +60,7 @@ void multiplyByRoot(const double* m, const double* v, double* result) {
 } // namespace
 
 BodyStep::BodyStep(const vector<RigidBody>& bodies) : bodies(bodies), states(bodies.size()),
-        right(6*bodies.size()) {
+        right(6*bodies.size()), found(6*bodies.size()) {
     for (const RigidBody& own : bodies)
         finders.emplace_back(own);
 }
@@ -134,13 +134,20 @@ void BodyStep::drawNoise() {
     }
 }
 
-/** Find the friction against turning in a frame half-way between those before and after the step. */
-void BodyStep::findFriction(const RigidBody& own, State& body) const {
+/** Find the friction against turning, and the noise of it, in a frame half-way between those before and now. */
+void BodyStep::describeHalfway(const RigidBody& own, State& body) const {
     double half[3];
     GibbsVector::halve(body.turned, half);
     RigidFrame halfway;
     GibbsVector::turn(half, body.start, halfway);
     halfway.turnMatrix(own.rotationalFriction, body.rotationalFriction);
+    halfway.turn(body.randomTorque, body.turnedRandomTorque);
+}
+
+/** Add the friction of a body, over the length of the step. */
+void BodyStep::addFriction(const RigidBody& own, const State& body, double* matrix) const {
+    addBlock(UNITY, own.friction/settings.stepSize, 0, matrix);
+    addBlock(body.rotationalFriction, 1/settings.stepSize, 3, matrix);
 }
 
 /** Find where places are against centres now. */
@@ -165,7 +172,7 @@ void BodyStep::eliminate(const CouplingTerm* newTerms, int count, double* moves)
         State& body = states[i];
         if (!body.held)
             turnFreely(bodies[i], body);
-        findFriction(bodies[i], body);
+        describeHalfway(bodies[i], body);
     }
     findArms();
     // Those before the first iteration are of another step.
@@ -173,19 +180,14 @@ void BodyStep::eliminate(const CouplingTerm* newTerms, int count, double* moves)
         if (State& body = states[terms[i].lane]; body.settled)
             addProducts(expectedForces+3*i, &bodies[terms[i].lane].places[3*terms[i].node], body.pulls);
     findMetricTorques();
-    findProjections();
+    knowsProjections = false;
     for (int i : going) {
         State& body = states[i];
         setRight(bodies[i], body, &right[6*i]);
-        const double friction = bodies[i].friction/settings.stepSize;
-        const double isotropic[] = {friction, 0, 0, friction, 0, friction};
         fill_n(body.matrix, 36, 0.0);
-        addBlock(isotropic, 1, 0, body.matrix);
-        addBlock(body.rotationalFriction, 1/settings.stepSize, 3, body.matrix);
+        addFriction(bodies[i], body, body.matrix);
         // As the body turns, so do the arms of forces: what makes these longer is left out.
-        const double outwards = 0.5*max(0.0, traceOfProducts(body.pulls, body.now));
-        const double resistance[] = {outwards, 0, 0, outwards, 0, outwards};
-        addBlock(resistance, 1, 3, body.matrix);
+        addBlock(UNITY, 0.5*max(0.0, traceOfProducts(body.pulls, body.now)), 3, body.matrix);
     }
     for (int i = 0; i < numTerms; i++) {
         addStiffness(terms[i].stiffness, &arms[3*i], states[terms[i].lane].matrix);
@@ -201,11 +203,7 @@ void BodyStep::eliminate(const CouplingTerm* newTerms, int count, double* moves)
 
 /** What is left of the balance of forces and torques, without the forces of couplings. */
 void BodyStep::setRight(const RigidBody& own, const State& body, double* result) const {
-    double random[3], lag[3], drag[3], half[3];
-    GibbsVector::halve(body.turned, half);
-    RigidFrame halfway;
-    GibbsVector::turn(half, body.start, halfway);
-    halfway.turn(body.randomTorque, random);
+    double lag[3], drag[3];
     for (int k = 0; k < 3; k++)
         lag[k] = (body.turned[k]-body.spin[k])/settings.stepSize;
     multiply(body.rotationalFriction, lag, drag);
@@ -218,7 +216,8 @@ void BodyStep::setRight(const RigidBody& own, const State& body, double* result)
     findTorque(body.pulls, body.now, pullsNow);
     for (int k = 0; k < 3; k++) {
         result[k] = body.force[k]+body.randomForce[k]-own.friction/settings.stepSize*(body.moved[k]-body.drift[k]);
-        result[3+k] = 0.5*(before[k]+now[k]+pullsBefore[k]-pullsNow[k])+random[k]-drag[k]+body.metricTorque[k];
+        result[3+k] = 0.5*(before[k]+now[k]+pullsBefore[k]-pullsNow[k])+body.turnedRandomTorque[k]-drag[k]+
+                body.metricTorque[k];
     }
 }
 
@@ -265,17 +264,19 @@ void BodyStep::findProjections() {
             regular[7*k] += LEAST_SHARE_OF_FORCES*(lengths[k/3]+(lengths[k/3] > 0 ? 0 : 1));
         invertSix(regular, own);
     }
+    knowsProjections = true;
 }
 
 /** Take off what forces of places of a body against each other do not move it by. */
 template <class Number> void BodyStep::project(Number* onPlaces) {
+    if (!knowsProjections)
+        findProjections();
     gatherForces(onPlaces);
-    vector<double> least(right.size());
     for (int i : going)
-        multiplySix(states[i].projection, &right[6*i], &least[6*i]);
+        multiplySix(states[i].projection, &right[6*i], &found[6*i]);
     for (int i = 0; i < numTerms; i++) {
         double force[3];
-        findMove(&least[6*terms[i].lane], &arms[3*i], force);
+        findMove(&found[6*terms[i].lane], &arms[3*i], force);
         for (int k = 0; k < 3; k++)
             onPlaces[TermBlocks::place(i, k)] = force[k];
     }
@@ -295,11 +296,8 @@ void BodyStep::findMetricTorques() {
     vector<double> matrices(36*bodies.size());
     vector<double> halfway(3*joints.size());
     for (int i : going) {
-        const double perStep = bodies[i].friction/settings.stepSize;
-        const double isotropic[] = {perStep, 0, 0, perStep, 0, perStep};
         fill_n(states[i].metricTorque, 3, 0.0);
-        addBlock(isotropic, 1, 0, &matrices[36*i]);
-        addBlock(states[i].rotationalFriction, 1/settings.stepSize, 3, &matrices[36*i]);
+        addFriction(bodies[i], states[i], &matrices[36*i]);
     }
     for (size_t i = 0; i < joints.size(); i++) {
         const CouplingTerm& joint = joints[i];
@@ -351,12 +349,11 @@ template <class Number> void BodyStep::gatherForces(const Number* onPlaces) {
 
 template <class Number> void BodyStep::respondAs(const Number* onPlaces, Number* moves) {
     gatherForces(onPlaces);
-    vector<double> changes(right.size());
     for (int i : going)
-        multiplySix(states[i].inverse, &right[6*i], &changes[6*i]);
+        multiplySix(states[i].inverse, &right[6*i], &found[6*i]);
     for (int i = 0; i < numTerms; i++) {
         double move[3];
-        findMove(&changes[6*terms[i].lane], &arms[3*i], move);
+        findMove(&found[6*terms[i].lane], &arms[3*i], move);
         for (int k = 0; k < 3; k++)
             moves[TermBlocks::place(i, k)] = move[k];
     }

@@ -73,21 +73,22 @@ private:
         double metricTorque[3];
         /** How far the centre has moved, and the turn. */
         double moved[3], turned[3];
-        /** The friction against turning half-way. */
-        double rotationalFriction[6];
+        /** The friction against turning half-way, and the noise of it. */
+        double rotationalFriction[6], turnedRandomTorque[3];
         /** Of the equations of an iteration: their matrix and its inverse, and the motion and the turn they lead to. */
         double matrix[36], inverse[36], change[6];
         /** Whether a coupling holds the body off its centre. */
         bool held;
         /** Products of the forces of couplings that are expected with their places, in the way of moments. */
         double pulls[9];
-        /** The inverse of the sum of STS, see keepWhatMoves(). */
+        /** The inverse of the sum of STS, see keepWhatMoves(); known once that has been asked for. */
         double projection[36];
     };
     void describeFlow(const RigidBody& own, State& body) const;
     void drawNoise();
     void sumForces(const RigidBody& own, const double* forces, State& body) const;
-    void findFriction(const RigidBody& own, State& body) const;
+    void describeHalfway(const RigidBody& own, State& body) const;
+    void addFriction(const RigidBody& own, const State& body, double* matrix) const;
     void findMetricTorques();
     void findProjections();
     template <class Number> void project(Number* onPlaces);
@@ -110,8 +111,9 @@ private:
     std::vector<CouplingTerm> joints;
     /** Where the place of each term is against the centre now. */
     std::vector<double> arms;
-    /** Six numbers for each body. */
-    std::vector<double> right;
+    /** Six numbers for each body: forces, and what they lead to. */
+    std::vector<double> right, found;
+    bool knowsProjections = false;
     const double *positions = nullptr, *expectedForces = nullptr;
     const CouplingTerm* terms = nullptr;
     int numTerms = 0;

@@ -14,12 +14,6 @@
 
 typedef array<double, 3> Vec;
 
-static void cross(const double* a, const double* b, double* result) {
-    result[0] = a[1]*b[2]-a[2]*b[1];
-    result[1] = a[2]*b[0]-a[0]*b[2];
-    result[2] = a[0]*b[1]-a[1]*b[0];
-}
-
 static void testTurns() {
     NormalNumbers normal(1);
     for (int i = 0; i < 50; i++) {
