@@ -5,7 +5,7 @@ import numpy as np
 from ..couplings.link_places import as_places
 from ..kinetics.crosslinker import Crosslinker
 from ..kinetics.hand import Hand
-from .tables.bodies import body_group_of
+from .table import group_of
 
 
 def add_bodies(configuration, filaments, seed):
@@ -67,7 +67,7 @@ def spheres_of_bodies(configuration, filaments, contacts):
     """Particles and radii in nm of the spheres of bodies; of those that take part in contacts, or of all."""
     particles, radii = [], []
     for number, placed in enumerate(filaments.bodies):
-        if contacts and not body_group_of(number, configuration.bodies).contacts:
+        if contacts and not group_of(number, configuration.bodies).contacts:
             continue
         spheres = placed.body.radii > 0.0
         particles += filaments.body_indices[number][spheres].tolist()

@@ -161,3 +161,12 @@ class TableKind:
             "additionalProperties": False,
         }
         return {**content, **({"required": required} if required else {})}
+
+
+def group_of(number, groups):
+    """The group of a table that has a filament or body, by the number of this in the file."""
+    for group in groups:
+        if number < group.count:
+            return group
+        number -= group.count
+    raise IndexError(number)

@@ -10,7 +10,8 @@ from ...errors import InputError
 from ...filaments.body import Body, random_rotation, rotation_along
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
-from ..table import TableKind
+from ..table import TableKind, group_of
+from .particles import check_name_and_places
 from .shapes import REGION, REGION_EXAMPLE, Region
 
 _TAKEN = ("NOD", "ATT", "BED", "BOD")
@@ -193,19 +194,8 @@ def read_body(entries, tables, groups, box, seed):
 
     The seed is that of random directions of filaments.
     """
-    name = entries["name"]
-    if not (name.isalnum() and name.isascii() and len(name) <= 5):
-        raise entries.at("name").error(f"must be 1 to 5 letters or digits, but is {name!r}.")
-    if name in _TAKEN:
-        raise entries.at("name").error(f"{name!r} is that of other particles: choose another.")
+    check_name_and_places(entries, box, _TAKEN, "other particles")
     entries.only_one("radius", "radii")
-    entries.only_one("count", "positions")
-    if "positions" in entries:
-        entries.refuse(("inside",), "cannot be with positions.")
-    else:
-        entries.require("count")
-        if box is None:
-            entries.require("inside")
     planes = [group.planar for group in groups]
     planar = bool(planes) and all(planes) if entries["planar"] is None else entries["planar"]
     if planar and entries["direction"] is not None and entries["direction"][2] != 0.0:
@@ -217,7 +207,7 @@ def read_body(entries, tables, groups, box, seed):
         points, held = _held(entries, tables, groups, planar, count, points, radii, [seed, *entries.place.path[1:], 7])
         radii = np.concatenate([radii, np.zeros(len(points) - len(radii))])
     with entries.naming():
-        body = Body(points, radii, name)
+        body = Body(points, radii, entries["name"])
     return BodyGroup(
         body,
         count,
@@ -247,18 +237,9 @@ def check_body_point(place, bodies):
     count = sum(own.count for own in bodies)
     if place["body"] >= count:
         raise place.at("body").error(f"{place['body']} does not exist; there are {count}, counted from 0.")
-    points = len(body_group_of(place["body"], bodies).body.points)
+    points = len(group_of(place["body"], bodies).body.points)
     if place["body_point"] >= points:
         raise place.at("body_point").error(f"{place['body_point']} does not exist; there are {points}, from 0 on.")
-
-
-def body_group_of(number, bodies):
-    """The BodyGroup of a body, by its number in the file."""
-    for own in bodies:
-        if number < own.count:
-            return own
-        number -= own.count
-    raise IndexError(number)
 
 
 def _points(entries):

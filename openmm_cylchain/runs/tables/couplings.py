@@ -19,7 +19,7 @@ from ..keys import (
     direction,
     point,
 )
-from ..table import ACTIVE, TableKind
+from ..table import ACTIVE, TableKind, group_of
 from .bodies import check_body_point
 from .filament_types import TypeNames
 from .shapes import SHAPE_KEYS, read_shape
@@ -338,15 +338,6 @@ def _check_filament(entries, number, groups):
     count = sum(group.count for group in groups)
     if number >= count:
         raise entries.at("filament").error(f"{number} does not exist; there are {count}, counted from 0.")
-
-
-def group_of(number, groups):
-    """The group of a filament, by its number in the file."""
-    for group in groups:
-        if number < group.count:
-            return group
-        number -= group.count
-    raise IndexError(number)
 
 
 def _check_node(entries, numbers, groups):

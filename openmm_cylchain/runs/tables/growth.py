@@ -8,8 +8,7 @@ from ...filaments.severing import Severing
 from ...time_steps.schemes import IMPLICIT_SCHEMES
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Either, Flag, Inline, Key, Listing, Named, Quantity, Text, close_match
-from ..table import TableKind
-from .couplings import group_of
+from ..table import TableKind, group_of
 
 PRESETS = {"MDIA1_ENDS": MDIA1_ENDS}
 """States of ends by the names that a configuration uses."""

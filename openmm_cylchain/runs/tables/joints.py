@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from ...units import quantities as units
 from ..keys import REQUIRED, Key, Pair, Quantity, direction
-from ..table import ACTIVE, TableKind
-from .couplings import PLACE_KEYS, check_place, group_of
+from ..table import ACTIVE, TableKind, group_of
+from .couplings import PLACE_KEYS, check_place
 
 _TANGENT = TableKind(
     "tangent",

@@ -58,12 +58,16 @@ class ParticleGroup:
         return generator.uniform(0.0, box, (self.count, 3))
 
 
-def read_particles(entries, solvent, box):
-    """The ParticleGroup of a [[particles]] table."""
-    if not (entries["name"].isalnum() and entries["name"].isascii() and len(entries["name"]) <= 5):
-        raise entries.at("name").error(f"must be 1 to 5 letters or digits, but is {entries['name']!r}.")
-    if entries["name"] in ("NOD", "ATT", "BED"):
-        raise entries.at("name").error(f"{entries['name']!r} is that of nodes: choose another.")
+def check_name_and_places(entries, box, taken=("NOD", "ATT", "BED"), owner="nodes"):
+    """Raise ConfigurationError unless Entries have a name for structure files, and say how many begin where.
+
+    ``taken`` are names of particles of an ``owner``.
+    """
+    name = entries["name"]
+    if not (name.isalnum() and name.isascii() and len(name) <= 5):
+        raise entries.at("name").error(f"must be 1 to 5 letters or digits, but is {name!r}.")
+    if name in taken:
+        raise entries.at("name").error(f"{name!r} is that of {owner}: choose another.")
     entries.only_one("count", "positions")
     if "positions" in entries:
         entries.refuse(("inside",), "cannot be with positions.")
@@ -71,6 +75,11 @@ def read_particles(entries, solvent, box):
         entries.require("count")
         if box is None:
             entries.require("inside")
+
+
+def read_particles(entries, solvent, box):
+    """The ParticleGroup of a [[particles]] table."""
+    check_name_and_places(entries, box)
     entries.only_one(
         "friction",
         "diffusion",
