@@ -208,6 +208,8 @@ def _configuration(raw, text, folder, lines):
     monomers = tuple(read_monomers(own, box, walls) for own in tables["monomers"])
     check_names(tables["monomers"], monomers)
     groups = _filaments(tables, solvent, box, folder, monomers)
+    if not groups:
+        _refuse_without_filaments(tables)
     check_walls(tables["wall"], walls, groups)
     seed = read_seed(settings)
     bodies = tuple(read_body(own, tables, groups, box, seed) for own in tables["body"])
@@ -277,6 +279,13 @@ def _read_tables(raw):
     if not (tables["filament"] or tables["nucleation"] or tables["body"]):
         raise InputError("There is no [[filament]] table: add one for every kind of filament, or a [[body]].")
     return tables
+
+
+def _refuse_without_filaments(tables):
+    # What names a filament is refused by its number.
+    random = [entries for entries in tables["link"] if "within" in entries]
+    for entries in (*tables["contacts"], *tables["linkers"], *random):
+        raise entries.error("is about filaments, but there is no [[filament]] table: leave it out, or add one.")
 
 
 def _filaments(tables, solvent, box, folder, monomers):

@@ -48,6 +48,19 @@ def test_a_run_of_bodies_alone(tmp_path):
     assert json.loads((tmp_path / "out" / "summary.json").read_text())
 
 
+@pytest.mark.parametrize(
+    "table",
+    [
+        '[contacts]\ndiameter = "10 nm"',
+        '[[linkers]]\ntype = "ALPHA_ACTININ"\ncount = 5\nvolume = "1 um^3"',
+        '[[link]]\nwithin = "30 nm"\nstiffness = "1 pN/nm"',
+    ],
+)
+def test_what_is_about_filaments_is_refused_without_any(table):
+    with pytest.raises(InputError, match=r"is about filaments, but there is no \[\[filament\]\] table"):
+        parse_configuration(BALLS + table + "\n")
+
+
 def test_bodies_alone_are_not_planar():
     assert not parse_configuration(BALLS).bodies[0].planar
     assert parse_configuration(BALLS.replace('name = "BALL"', "planar = true")).bodies[0].planar
