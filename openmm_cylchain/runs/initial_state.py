@@ -9,9 +9,8 @@ import numpy as np
 import openmm
 from openmm import app, unit
 
-from ..beams.curve import curve_points, element_slopes
+from ..beams.curve import curve_points
 from ..couplings.capsule_contacts import capsule_contact_force, contact_spacing
-from ..couplings.joints import Joints
 from ..couplings.planar_crossings import PlanarSegments
 from ..couplings.pulling import constant_force, constant_tension
 from ..couplings.walls import filament_wall_force, wall_force
@@ -19,13 +18,13 @@ from ..errors import InputError
 from ..filaments import shapes
 from ..filaments.filaments_that_take_part import FilamentsThatTakePart
 from ..filaments.monomers import Monomers
-from ..filaments.segment_place import SegmentPlace
 from ..output.progress import LateMessages, ProgressMessages
 from ..systems.filaments import Filaments
 from ..theory import chain_mean_square_end_to_end
 from ..time_steps.recommended_step import recommended_time_step
 from .errors_of_tables import located_errors
 from .initial_bodies import add_bodies, add_holding_linkers, first_particles, spheres_of_bodies
+from .initial_joints import add_joints
 from .initial_links import add_links
 from .keys import ConfigurationError
 
@@ -76,7 +75,7 @@ def build_system(configuration, engine, seed, kinetics=True, begun=None):
     present = filaments if all(own.takes_part for own in filaments) else FilamentsThatTakePart(filaments)
     touching, touching_radii = spheres_of_bodies(configuration, filaments, contacts=True)
     count = add_links(configuration, filaments, system, seed)
-    _add_joints(configuration, filaments, system)
+    add_joints(configuration, filaments, system)
     tables = configuration.tables
     if configuration.contacts is not None and len(present):
         own = configuration.contacts
@@ -451,55 +450,3 @@ def _pull(own, filaments):
     if own.force is None:
         return constant_tension(filaments, own.tension, own.direction, own.filaments)
     return constant_force([int(filaments.node_indices[number][own.node]) for number in own.filaments], own.force)
-
-
-def _add_joints(configuration, filaments, system):
-    if not configuration.joints:
-        return
-    joints = Joints(configuration.joints[0].stiffness)
-    for own, entries in zip(configuration.joints, configuration.tables["joint"]):
-        with entries.naming():
-            _add_joint(own, joints, filaments)
-    joints.add_to(system)
-
-
-def _add_joint(own, joints, filaments):
-    # The filament comes first, and a direction second.
-    places, vectors = zip(
-        *sorted((_tangent(entries, filaments) for entries in own.between), key=lambda one: one[0] is None)
-    )
-    second = vectors[1] if places[1] is None else places[1]
-    cosine = vectors[0] @ vectors[1] / np.prod(np.linalg.norm(vectors, axis=1))
-    angle = float(np.arccos(np.clip(cosine, -1.0, 1.0))) if own.angle is None else min(own.angle, np.pi)
-    if angle > 0.5 * np.pi * (1.0 + 1e-12):
-        # The same as the rest of a straight angle with the opposite of one of the two.
-        second = _opposite(second)
-        angle = np.pi - angle
-    joints.add(None, places[0], second, angle, own.stiffness)
-
-
-def _tangent(entries, filaments):
-    # The place of a tangent and the vector there; None and the vector for a direction.
-    if entries["direction"] is not None:
-        return None, np.array(entries["direction"])
-    number = entries["filament"]
-    if entries["node"] is not None:
-        node = entries["node"] % len(filaments[number].positions)
-        # At the end of the element before it, or of a ring at the beginning of the one behind it.
-        after = filaments[number].closed or node == 0
-        place = filaments.segment_place(number, segment=node if after else node - 1, fraction=float(not after))
-    else:
-        place = filaments.segment_place(number, entries["arc_length"], entries["segment"], entries["fraction"])
-    return place, _tangent_at(place, filaments, number)
-
-
-def _tangent_at(place, filaments, number):
-    own = filaments[number]
-    element = np.array([place.first, place.second]) - filaments.node_indices[number][0]
-    return element_slopes(own.positions[element], own.control_points[element], [place.fraction], 1.0)[0, 0]
-
-
-def _opposite(tangent):
-    if isinstance(tangent, SegmentPlace):
-        return SegmentPlace(tangent.second, tangent.first, 1.0 - tangent.fraction)
-    return -tangent
