@@ -121,9 +121,13 @@ def _along_filaments(run, names, counts):
         first += count
     kinds = np.array([names.index(own.label) for own in run.filaments], dtype=int)
     diameters = np.array([own.diameter for own in run.filaments], dtype=float)
-    bonds, bond_types = np.concatenate([_NO_BONDS, *bonds]), np.concatenate([_NO_BONDS[:, 0], *bond_types])
     counts = np.array(counts, dtype=int)
-    return bonds, bond_types, np.repeat(kinds, counts), np.repeat(diameters, counts)
+    return (
+        np.concatenate([_NO_BONDS, *bonds]),
+        np.concatenate([_NO_BONDS[:, 0], *bond_types]),
+        np.repeat(kinds, counts),
+        np.repeat(diameters, counts),
+    )
 
 
 def _cell(run):
