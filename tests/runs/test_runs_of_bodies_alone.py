@@ -48,6 +48,7 @@ def test_a_run_of_bodies_alone(tmp_path):
     assert main(["run", str(path), "--output", str(tmp_path / "out")]) == 0
     found = analysis.load(tmp_path / "out")
     assert len(found.filaments) == 0 and len(found.times) == 11
+    assert np.isnan(analysis.contraction(found)).all()
     assert (tmp_path / "out" / "summary.png").exists()
     assert json.loads((tmp_path / "out" / "summary.json").read_text())
 
