@@ -416,7 +416,7 @@ class Recorder:
                     segment=min(node, own.segments - 1),
                     step=self._step,
                 )
-        if curved or self._grows:
+        if curved or self._grows or not len(filaments):
             raise InstabilityError(
                 f"The energy is not finite in step {self._step}. Use a smaller time step.", step=self._step
             )

@@ -1,6 +1,7 @@
 """Runs without filaments: bodies alone, from the file to the summary."""
 
 import json
+import math
 
 import gsd.hoomd
 import matplotlib.pyplot as plt
@@ -10,8 +11,9 @@ from openmm import app
 
 from openmm_cylchain import Body, Filaments, RunReporter, analysis, make_whole
 from openmm_cylchain.cli import main
-from openmm_cylchain.errors import InputError
+from openmm_cylchain.errors import InputError, InstabilityError
 from openmm_cylchain.runs.configuration import parse_configuration
+from openmm_cylchain.runs.run import run
 
 BALLS = """
 title = "balls"
@@ -93,6 +95,12 @@ def test_a_reporter_writes_bodies_alone(tmp_path):
     assert found.steps.tolist() == [0, 5, 10]
     whole = make_whole(found.positions(2), filaments, np.diag([1000.0] * 3))
     assert np.all(whole._value == found.positions(2))
+
+
+def test_bodies_that_blow_up_are_said_to(tmp_path, monkeypatch):
+    monkeypatch.setattr("openmm_cylchain.runs.run.total_energies", lambda *_: (math.nan, 0.0))
+    with pytest.raises(InstabilityError, match="not finite"):
+        run(parse_configuration(BALLS), tmp_path / "out")
 
 
 def test_something_must_be_there():
