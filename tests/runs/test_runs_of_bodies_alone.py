@@ -103,6 +103,19 @@ def test_bodies_that_blow_up_are_said_to(tmp_path, monkeypatch):
         run(parse_configuration(BALLS), tmp_path / "out")
 
 
+def test_hands_need_filaments():
+    text = (
+        BALLS
+        + """[[linkers]]
+stiffness = "0.1 pN/nm"
+anchors = { body_table = 1 }
+hand = { binding_rate = "10 1/s", reach = "50 nm", unbinding_rate = "0.1 1/s" }
+"""
+    )
+    with pytest.raises(InputError, match="there are none"):
+        parse_configuration(text)
+
+
 def test_something_must_be_there():
     text = BALLS.replace("[[body]]", "[[particles]]")
     with pytest.raises(InputError):

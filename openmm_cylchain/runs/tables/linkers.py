@@ -257,6 +257,8 @@ def read_linkers(entries, groups, box, seed, walls=(), bodies=()):
                 f"The reach of a hand, {hand.reach:g} nm, must be at least a thousandth of a segment, "
                 f"{_LEAST_REACH * longest:g} nm."
             )
+        if not groups:
+            raise entries.error("A hand binds to filaments, but there are none: add a [[filament]] table.")
         if not any(hand.binds(own.type) for own in groups):
             raise entries.error(
                 f"A hand binds to filaments of the type {' or '.join(hand.binds_to)}, but those of the "
