@@ -177,7 +177,7 @@ def contraction(run: Run) -> FloatArray:
     require_run(run)
     if run.box is not None:
         raise InputError("A periodic box does not contract: look at contacts or distances instead.")
-    points = (np.concatenate(run.curves(frame)) for frame in range(len(run)))
+    points = (np.concatenate([np.zeros((0, 3)), *run.curves(frame)]) for frame in range(len(run)))
     radii = np.array([math.sqrt(float(np.var(own, axis=0).sum())) if len(own) else np.nan for own in points])
     there = np.flatnonzero(np.isfinite(radii))
     return radii / radii[there[0]] if len(there) else radii

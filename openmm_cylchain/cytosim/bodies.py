@@ -8,7 +8,15 @@ import numpy as np
 
 from .document import EXACT, LEFT_OUT, NEAREST, Note, Table, point, quantity
 from .filaments import add_on_body, first_length, shared_growth
-from .places import draw_direction, draw_inside, draw_position, fixed_direction, region_of, unknown_position
+from .places import (
+    UnknownDirectionError,
+    draw_direction,
+    draw_inside,
+    draw_position,
+    fixed_direction,
+    region_of,
+    unknown_position,
+)
 from .script import count_of
 from .settings import OFF, Settings
 
@@ -65,7 +73,7 @@ def add_bodies(translation, new):
     if new.kind == "aster":
         return _add_aster(translation, new, count, draw)
     own = translation.script.named(new.name, new.kind, new.line)
-    made = _add_table(translation, own, new, count, _shape_of(translation, new.kind, options, draw), draw)
+    made = _add_table(translation, own, new, count, _shape_of(translation, new.kind, options, draw))
     if made is not None and new.kind == "sphere" and len(made.groups) > 0:
         text = "points of a sphere stay where they are on it; in Cytosim they slide on its surface"
         made.table.comment(Note(NEAREST, text, new.line))
@@ -243,7 +251,7 @@ def _local(translation, options, key, text, draw):
     return draw_position(text, draw)
 
 
-def _add_table(translation, own, new, count, shape, draw):
+def _add_table(translation, own, new, count, shape):
     settings, options = own.settings, new.settings
     if not any(shape.radii):
         translation.left_out(f"{count} {new.name} without a radius", new.line, f"bodies: {new.kind}s without a radius")
@@ -263,7 +271,7 @@ def _add_table(translation, own, new, count, shape, draw):
         random = any(not text.strip()[:1].isdigit() for text in options.text("point1", default="0"))
         note = Note(NEAREST, "drawn once, the same for all of them") if count > 1 and random else None
         table.add("points", [point(place) for place in places], note)
-    _add_places(translation, table, new, count, draw)
+    _add_places(translation, table, new, count)
     if translation.dimensions == 2:
         table.add("planar", True, Note(EXACT, "two dimensions"))
     _note_surroundings(translation, table, settings)
@@ -289,7 +297,7 @@ def _note_surroundings(translation, table, settings):
         table.comment(Note(LEFT_OUT, text, settings.line_of("steric"), "contacts between bodies"))
 
 
-def _add_places(translation, table, new, count, draw):
+def _add_places(translation, table, new, count):
     options = new.settings
     text = options.text("position")
     fixed = options.text("placement") in ("off", "0", "none")
@@ -319,7 +327,7 @@ def _add_places(translation, table, new, count, draw):
             table.add("inside", region, Note(EXACT, "where all of their spheres are"))
     else:
         places = [draw_inside(text, draw, keep=not fixed) for _ in range(count)]
-        if None in [None if place is None else 0 for place in places]:
+        if any(place is None for place in places):
             translation.document.note(NEAREST, f"{new.name}: places outside of the space are taken", new.line)
             places = [draw_inside(text, draw, keep=False) if place is None else place for place in places]
         if translation.dimensions == 2:
@@ -339,9 +347,7 @@ def _add_direction(translation, table, options, direction, place, draw):
         return
     try:
         vector = draw_direction(direction, place if place is not None else np.ones(3), draw)
-    except Exception as error:
-        if type(error).__name__ != "UnknownDirectionError":
-            raise
+    except UnknownDirectionError:
         word = direction.split()[0]
         translation.left_out(f"direction = {direction}, for which they have any", line, f"directions: {word}")
         return
@@ -364,7 +370,7 @@ def _add_aster(translation, new, count, draw):
         if not any(shape.radii):
             shape = _Shape()
             shape.add(np.zeros(3), outer)
-        made = _add_table(translation, solid, new, count, shape, draw)
+        made = _add_table(translation, solid, new, count, shape)
     if made is None or made.table.value("filaments") is not None:
         translation.left_out(f"{count} {new.name} on {name}", new.line, "bodies: asters on a solid that is there")
         return options.take_rest()

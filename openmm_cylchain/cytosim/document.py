@@ -96,6 +96,11 @@ def quantity(value, unit):
     return f"{value:.12g} {unit}"
 
 
+def number_in(text):
+    """The number of a quantity, whatever its unit."""
+    return float(text.split()[0])
+
+
 def point(vector):
     """Three lengths in um."""
     return [quantity(round(float(value), 9) + 0.0, "um") for value in vector]

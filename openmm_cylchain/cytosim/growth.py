@@ -8,7 +8,7 @@ in no fiber; here, monomers of the length delta come at the rate k_on c and go a
 import math
 from dataclasses import dataclass, field
 
-from .document import EXACT, NEAREST, Note, quantity
+from .document import EXACT, NEAREST, Note, number_in, quantity
 
 _STATES = {"white": 0, "green": 1, "yellow": 2, "orange": 3, "red": 4, "static": 0}
 _STATES |= {"grow": 1, "growing": 1, "shrink": 4, "shrinking": 4}
@@ -242,7 +242,7 @@ def _from_shrinking(rates):
     values = {name: value for name, (value, _) in rates.items()}
     growing = {"name": "growing", "switch_rates": {"shrinking": values["catastrophe_rate"]}}
     if "blocked_catastrophe_rate" in values:
-        more = float(values["blocked_catastrophe_rate"].split()[0]) - float(values["catastrophe_rate"].split()[0])
+        more = number_in(values["blocked_catastrophe_rate"]) - number_in(values["catastrophe_rate"])
         growing["blocked_switch_rates"] = {"shrinking": quantity(more, "1/s")}
     if "catastrophe_length" in values:
         growing["switch_length"] = values["catastrophe_length"]

@@ -2,7 +2,7 @@
 
 import math
 
-from .document import EXACT, LEFT_OUT, NEAREST, Note, quantity
+from .document import EXACT, LEFT_OUT, NEAREST, Note, number_in, quantity
 from .growth import binding_key
 from .settings import OFF
 
@@ -38,7 +38,7 @@ class HandRead:
     @property
     def reach(self):
         """In um."""
-        return float(self.table["reach"].split()[0])
+        return number_in(self.table["reach"])
 
 
 def read_hand(translation, name, line):
@@ -143,9 +143,9 @@ def _hold_at_times(translation, hand, settings, holds):
     # Cytosim draws for it once in each step of a motor, or of time.
     attempts = 1.0 / translation.script.time_step
     if "site_spacing" in hand.table:
-        attempts = abs(_number(hand.table["speed"])) / _number(hand.table["site_spacing"])
+        attempts = abs(number_in(hand.table["speed"])) / number_in(hand.table["site_spacing"])
     text = f"a chance of {holds:g} to stay at an end"
-    if attempts * (1.0 - holds) <= _number(hand.table["unbinding_rate"]):
+    if attempts * (1.0 - holds) <= number_in(hand.table["unbinding_rate"]):
         hand.note(
             NEAREST, f"{text}, from which it unbinds more often than at its rate: at its rate here", settings.line
         )
@@ -164,10 +164,6 @@ def _hold_shrinking(translation, hand, settings, forward):
         hand.note(NEAREST, "hold_shrinking_end: it stays at the end that it has walked to", line)
     else:
         hand.note(LEFT_OUT, "hold_shrinking_end", line, _NEAR_ENDS)
-
-
-def _number(text):
-    return float(text.split()[0])
 
 
 def _read_keys(translation, hand, settings):

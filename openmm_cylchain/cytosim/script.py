@@ -189,8 +189,7 @@ class _Follower:
                 parts[-1].append(run)
             else:
                 parts.append([run])
-        parts = [[run for run in part if run["steps"] > 0] or part[:1] for part in parts]
-        return parts
+        return [[run for run in part if run["steps"] > 0] or part[:1] for part in parts]
 
     def _changes(self, first, last):
         return (what for _, what, _ in self._actions[first + 1 : last] if what)
@@ -331,7 +330,7 @@ class _Follower:
             # A count such as [10 * volume] is known with the space.
             count = first if first.startswith("[") else int(first)
             script.created.append(New(count, own, name, settings, command.line))
-            if own == "fiber" and _grows(script.properties[name], settings):
+            if own == "fiber" and _grows(script.properties[name]):
                 script.broken.append((command.line, f"new {' '.join(words)}, which grows"))
 
         return self._add(command, f"new {' '.join(words)}", create)
@@ -398,9 +397,9 @@ class _Follower:
     _do_include = _do_read
 
 
-def _grows(own, options):
+def _grows(fiber):
     # Whether fibers may grow: those cannot come between runs of one part.
-    return own.kind == "fiber" and own.settings.peek("activity") not in (None, "none", "0")
+    return fiber.settings.peek("activity") not in (None, "none", "0")
 
 
 def _replaced(block, names):

@@ -3,7 +3,7 @@
 import copy
 
 from ..runs.tables.stages import CHANGES, STAYS
-from .document import EXACT, LEFT_OUT, NEAREST, Note
+from .document import EXACT, LEFT_OUT, NEAREST, Note, number_in
 
 _REPEATED = ("linkers", "link", "wall", "tether", "pull", "nucleation", "monomers", "filament", "particles", "body")
 _ABSENT = {
@@ -21,7 +21,7 @@ _PLACES = ("position", "inside", "direction", "orientation", "nodes", "tangents"
 _NEEDS = "stages: {}"
 
 
-def add_stages(document, later, runs, unbound=()):
+def add_stages(document, later, runs, unbound):
     """Make a Document of the first run one of all.
 
     Parameters
@@ -55,7 +55,7 @@ def add_stages(document, later, runs, unbound=()):
         table.add("name", f"run {number + 1}")
         table.add("duration", duration, Note(EXACT, f"run {number + 1}", run.line))
         if number:
-            _add_changes(document, stages[number - 1], own, run.line, unbound[number - 1] if unbound else {})
+            _add_changes(document, stages[number - 1], own, run.line, unbound[number - 1])
 
 
 def _plain(document):
@@ -71,27 +71,26 @@ def _plain(document):
     return found
 
 
-def _same(first, second, name):
-    # Whether two tables are of one thing.
-    return name != "linkers" or first.get("name") == second.get("name")
+def _same_as(name, table, place, others):
+    # Which of others is of the same thing as a table: linkers by their names, others by their places; or None.
+    if name == "linkers":
+        return next((other for other in others if other.get("name") == table.get("name")), None)
+    return others[place] if place < len(others) else None
 
 
 def _complete(name, stages, document, later):
     # Every stage has the same tables: those that are not there in it, as such.
     order = []
     for own, source in zip(stages, (document, *later)):
-        there = own.get(name, [])
-        for place, table in enumerate(there):
-            known = [index for index, (other, *_) in enumerate(order) if _same(other, table, name)]
-            if (name == "linkers" and not known) or (name != "linkers" and place >= len(order)):
+        for place, table in enumerate(own.get(name, [])):
+            if _same_as(name, table, place, [other for other, *_ in order]) is None:
                 order.append((table, source.tables_called(f"[[{name}]]")[place], source))
     for number, own in enumerate(stages):
         there, complete = own.get(name, []), []
         for index, (table, source, whose) in enumerate(order):
-            mine = [other for other in there if other.get("name") == table.get("name")] if name == "linkers" else []
-            mine = mine or (there[index : index + 1] if name != "linkers" else [])
-            if mine:
-                complete.append(mine[0])
+            mine = _same_as(name, table, index, there)
+            if mine is not None:
+                complete.append(mine)
                 continue
             absent = {**table, **dict([_ABSENT[name]])} if name in _ABSENT else dict(table)
             absent.pop("bound", None)
@@ -154,7 +153,7 @@ def _longest(stages, document):
             lengths = [own["longest"] for own in growths if own is not None and "longest" in own]
             if not lengths:
                 continue
-            longest = max(lengths, key=lambda text: float(text.split()[0]))
+            longest = max(lengths, key=number_in)
             if table.value("growth") is not None:
                 table.value("growth")["longest"] = longest
             for inner in _inner_tables(document, table):

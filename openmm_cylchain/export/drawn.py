@@ -21,8 +21,8 @@ def check_path(path: str | Path, ending: str) -> Path:
 
 
 def thickness(run: Run) -> float:
-    """The diameter in nm of the thinnest filament, of which linkers are drawn."""
-    return min(own.diameter for own in run.filaments)
+    """The diameter in nm of the thinnest filament, of which linkers are drawn; without filaments, of a particle."""
+    return min(own.diameter for own in run.filaments or [one for one in run.particles if one.diameter])
 
 
 def visible_diameter(run: Run, own: RunParticles) -> float:

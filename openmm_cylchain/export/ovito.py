@@ -9,6 +9,7 @@ from ..errors import InputError
 from .drawn import check_path, spring_labels, thickness, visible_diameter, walls
 
 _ANGSTROM = 10.0  # in a nm
+_NO_BONDS = np.zeros((0, 2), dtype=int)
 
 
 def write_ovito(run: Run, path: str | Path) -> None:
@@ -45,7 +46,7 @@ def write_ovito(run: Run, path: str | Path) -> None:
     walls_there = ["wall"] if len(wall_points) else []
     first_particle = len(names) + len(hands) + len(walls_there)
     center, cell = _cell(run)
-    known: list[int] = []
+    known: list[int] | None = None
     temporary = path.with_name(f".{path.stem}.new.gsd")
     try:
         with gsd.hoomd.open(str(temporary), mode="w") as file:
@@ -55,7 +56,7 @@ def write_ovito(run: Run, path: str | Path) -> None:
                 if counts != known:
                     # Those of filaments that grow change.
                     known, (segments, kinds, types, diameters) = counts, _along_filaments(run, names, counts)
-                positions, bonds = [np.concatenate(curves)], [segments]
+                positions, bonds = [np.zeros((0, 3)), *curves], [segments]
                 particle_types, bond_types, widths = [types], [kinds], [diameters]
                 count = len(types)
                 for kind in range(len(springs)):
@@ -106,7 +107,7 @@ def _joined(lines):
         first = count + np.arange(len(line) - 1)
         bonds.append(np.stack([first, first + 1], axis=1))
         count += len(line)
-    return np.concatenate([np.zeros((0, 3)), *lines]), np.concatenate([np.zeros((0, 2), dtype=int), *bonds])
+    return np.concatenate([np.zeros((0, 3)), *lines]), np.concatenate([_NO_BONDS, *bonds])
 
 
 def _along_filaments(run, names, counts):
@@ -118,9 +119,15 @@ def _along_filaments(run, names, counts):
         bonds.append(np.stack([points, np.roll(points, -1)], axis=1)[: max(0, count - (not own.ring))])
         bond_types.append(np.full(len(bonds[-1]), names.index(own.label)))
         first += count
-    types = np.repeat([names.index(own.label) for own in run.filaments], counts)
-    diameters = np.repeat([own.diameter for own in run.filaments], counts)
-    return np.concatenate(bonds), np.concatenate(bond_types), types, diameters
+    kinds = np.array([names.index(own.label) for own in run.filaments], dtype=int)
+    diameters = np.array([own.diameter for own in run.filaments], dtype=float)
+    counts = np.array(counts, dtype=int)
+    return (
+        np.concatenate([_NO_BONDS, *bonds]),
+        np.concatenate([_NO_BONDS[:, 0], *bond_types]),
+        np.repeat(kinds, counts),
+        np.repeat(diameters, counts),
+    )
 
 
 def _cell(run):

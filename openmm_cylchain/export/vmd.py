@@ -81,7 +81,7 @@ def write_vmd(run: Run, path: str | Path) -> None:
     ]
     # Licorice knows the radius of bonds. Those of beam elements are chords, and those of filaments that are not there
     # now are dots: curves are drawn in their place.
-    widest, passing = max(own.diameter for own in run.filaments), run.passing
+    widest, passing = max((own.diameter for own in run.filaments), default=0.0), run.passing
     curves: dict[int, tuple[float, list[int]]] = {}
     for number, (kind, color) in enumerate(filament_colors(run).items()):
         diameter = max(own.diameter for own in run.filaments if own.label == kind)

@@ -56,5 +56,5 @@ class FilamentsThatTakePart:
     @property
     def attachment_indices(self) -> IntArray:
         """Particles of their attachment points."""
-        own = [one.filament in set(self.numbers) for one in self._filaments.attachments]
+        own = [self._filaments[one.filament].takes_part for one in self._filaments.attachments]
         return self._filaments.attachment_indices[np.array(own, dtype=bool)]

@@ -85,47 +85,44 @@ class LateMessages:
 class RunProgress:
     """Reports how far a run is, how fast it goes and how long it will take, on standard output.
 
-    ``steps`` are those of the whole run, of which this part starts from ``first_step``; ``time_step`` is in ps.
+    ``end`` is the time in ps at which the whole run ends, of which this part starts from ``begin``.
     """
 
-    def __init__(self, steps: int, first_step: int, time_step: float) -> None:
-        self._steps = steps
-        self._first = first_step
-        self._time_step = time_step
+    def __init__(self, end: float, begin: float) -> None:
+        self._end = end
+        self._begin = self._time = begin
         self._line = StatusLine(sys.stdout)
         self._start = time.monotonic()
         self._last_refresh = self._start
-        self._next_fraction = first_step / steps + _LINE_FRACTION
+        self._next_fraction = begin / end + _LINE_FRACTION
 
-    def update(self, step: int) -> None:
-        """Report that the run has come to ``step``, if it is time to report."""
-        now = time.monotonic()
+    def update(self, simulated: float) -> None:
+        """Report that the run has come to a time in ps, if there is reason to report."""
+        now, self._time = time.monotonic(), simulated
         if self._line.in_place:
             if now - self._last_refresh >= _REFRESH_SECONDS:
                 self._last_refresh = now
-                self._line.write(self._text(step, now))
-        elif step / self._steps >= self._next_fraction and step < self._steps:
-            self._next_fraction = step / self._steps + _LINE_FRACTION
-            self._line.write(self._text(step, now))
+                self._line.write(self._text(now))
+        elif simulated / self._end >= self._next_fraction and simulated < self._end:
+            self._next_fraction = simulated / self._end + _LINE_FRACTION
+            self._line.write(self._text(now))
 
-    def finish(self, step: int) -> None:
+    def finish(self) -> None:
         """Report the end of the run, or of this part of it."""
-        self._line.write(self._text(step, time.monotonic()))
+        self._line.write(self._text(time.monotonic()))
         self._line.end()
 
-    def _text(self, step, now):
-        total = self._steps * self._time_step
-        unit, length = time_unit(total)
-        simulated = step * self._time_step
-        line = f"{100.0 * step / self._steps:5.1f} %  {simulated / length:.4g} of {total / length:.6g} {unit}"
+    def _text(self, now):
+        unit, length = time_unit(self._end)
+        line = f"{100.0 * self._time / self._end:5.1f} %  {self._time / length:.4g} of {self._end / length:.6g} {unit}"
         elapsed = now - self._start
-        done = step - self._first
+        done = self._time - self._begin
         if done == 0 or elapsed <= 0:
             return line
-        line += f"  {format_time(done * self._time_step / elapsed, 3)}/s"
-        if step == self._steps:
+        line += f"  {format_time(done / elapsed, 3)}/s"
+        if self._time == self._end:
             return f"{line}  took {_clock(elapsed)}"
-        return f"{line}  {_clock(elapsed * (self._steps - step) / done)} left"
+        return f"{line}  {_clock(elapsed * (self._end - self._time) / done)} left"
 
 
 def _clock(seconds):

@@ -137,7 +137,7 @@ class Scene:
         return parts
 
     def _linkers(self, frame):
-        radius = 0.5 * float(np.median(self.diameters))
+        radius = 0.5 * float(np.median(self.diameters if len(self.diameters) else self.ball_diameters))
         parts = []
         for kind, name in enumerate(linker_colors(self.run, self.scale is not None)):
             lines, places = self.run.springs(frame, kind)
@@ -191,12 +191,12 @@ def make_scene(run: Run, look: Look, frames: list[int]) -> Scene:
     extent = float(np.linalg.norm(np.ptp(points, axis=0)))
     own = np.array([filament.diameter for filament in run.filaments])
     if look.diameter is None:
-        diameters = np.maximum(own, _VISIBLE * extent * own / own.max())
+        diameters = np.maximum(own, _VISIBLE * extent * own / own.max(initial=0.0))
     else:
         diameters = own if look.diameter == 0.0 else np.full(len(own), look.diameter)
     balls = [max(own.diameter, _VISIBLE_BALL * extent) for own in look.particles_of(run)]
     # Tubes and balls stand out from the points by half their width.
-    widest = max(diameters.max(), *balls) if balls else diameters.max()
+    widest = max([*diameters, *balls], default=0.0)
     points = np.concatenate([points + 0.5 * widest, points - 0.5 * widest])
     axis = _first_director(run, frames) if look.color == "orientation" else None
     scale = _color_scale(run, look, axis, frames)
@@ -223,9 +223,12 @@ def _framed_points(run, look, frames):
         corners = np.array(np.meshgrid(*[[0.0, 1.0]] * 3)).reshape(3, 8).T
         return corners @ run.box
     sampled = {frames[round(place)] for place in np.linspace(0, len(frames) - 1, min(len(frames), 20))}
-    points = np.concatenate([own for frame in sampled for own in run.curves(frame)])
     points = np.concatenate(
-        [points, *(run.positions(frame)[own.indices] for frame in sampled for own in look.particles_of(run))]
+        [
+            np.zeros((0, 3)),
+            *(own for frame in sampled for own in run.curves(frame)),
+            *(run.positions(frame)[own.indices] for frame in sampled for own in look.particles_of(run)),
+        ]
     )
     if not len(points):
         points = run.positions(frames[0])
@@ -238,7 +241,7 @@ def _rgb(color):
 
 def _first_director(run, frames):
     # Of the first frame with a filament; any where there is none.
-    vectors = (np.concatenate(_segments(run, frame)) for frame in frames)
+    vectors = (np.concatenate([np.zeros((0, 3)), *_segments(run, frame)]) for frame in frames)
     return next((director(own) for own in vectors if len(own)), np.array([1.0, 0.0, 0.0]))
 
 
@@ -264,7 +267,7 @@ def _color_scale(run, look, axis, frames):
     if look.color == "orientation":
         return ColorScale("angle to the director (°)", "viridis", 0.0, 90.0)
     sampled = {frames[round(place)] for place in np.linspace(0, len(frames) - 1, min(len(frames), 8))}
-    values = np.concatenate([np.concatenate(_values(run, look, axis, frame)) for frame in sampled])
+    values = np.concatenate([np.zeros(0), *(own for frame in sampled for own in _values(run, look, axis, frame))])
     values = values if len(values) else np.zeros(1)
     if look.color == "bending":
         return ColorScale("angle between segments (°)", "viridis", 0.0, float(np.quantile(values, 0.98)) or 1.0)

@@ -152,7 +152,10 @@ def read_configuration(path):
 
 
 def _in_file(configuration, path):
-    stages = [dataclasses.replace(own, configuration=_in_file(own.configuration, path)) for own in configuration.stages]
+    # What stages share, they share still.
+    known = {id(own.configuration): own.configuration for own in configuration.stages}
+    named = {key: dataclasses.replace(own, path=path) for key, own in known.items()}
+    stages = [dataclasses.replace(own, configuration=named[id(own.configuration)]) for own in configuration.stages]
     return dataclasses.replace(configuration, path=path, stages=tuple(stages))
 
 

@@ -61,7 +61,7 @@ class Conformations:
             for places, radius in [self._spheres(frame)]
             for shift in (-1, 1)
         ]
-        points = np.concatenate(points or [np.zeros((1, 2))])
+        points = np.concatenate(points) if any(map(len, points)) else np.zeros((1, 2))
         if self._box is not None:
             points = np.array([np.zeros(2), self._box])
         self._lower, self._upper = points.min(axis=0), points.max(axis=0)

@@ -1,6 +1,5 @@
 """What a run would be, without one: what is built, what binds its step, how long it takes, how large its files get."""
 
-import itertools
 import tempfile
 
 import numpy as np
@@ -16,7 +15,7 @@ from .initial_state import box_vectors, recommended_step
 from .run import Recorder, steps
 from .run_directory import RunDirectory
 from .stage_transition import carry_over
-from .stages import naming_stage, stages_of
+from .stages import named_stages, naming_stage, stages_of, time_steps_in_words
 from .steady_populations import steady_population
 from .summary import group_labels, group_members
 
@@ -40,7 +39,7 @@ def dry_run(configuration):
     yield configuration.title or "Run"
     yield from _what_is_built(configuration, built)
     yield (
-        f"  {settings.steps} steps of {_time_steps(stages)}, scheme {settings.scheme}, "
+        f"  {settings.steps} steps of {time_steps_in_words(stages)}, scheme {settings.scheme}, "
         f"{built.filaments.engine} engine, platform {simulation.context.getPlatform().getName()}"
     )
     yield f"  recommended {format_time(recommended.step)}: {_binding(configuration, recommended)}"
@@ -119,21 +118,17 @@ def _binding(configuration, recommended):
     return f"{named_bound(configuration, names[0])}" if names and ":" in names[0] else recommended.reason
 
 
-def _time_steps(stages):
-    return " and ".join(dict.fromkeys(format_time(own.configuration.simulation.time_step) for own in stages))
-
-
 def _stages(stages, current):
     # In turn, with a few steps of each, which is to say that each can be begun.
     yield "  stages, each of which takes its first steps:"
     first, known = current, set()
+    lasts = {stage.number: last for stage, last in named_stages(stages)}
     for stage in stages:
         if not stage.is_piece:
-            pieces = [own for own in stages[stage.number :] if own.begin >= stage.begin]
-            count = 1 + sum(1 for _ in itertools.takewhile(lambda own: own.is_piece, pieces[1:]))
-            end = pieces[count - 1].end
+            last = lasts[stage.number]
+            count = last.number - stage.number + 1
             divided = f", in {count} pieces" if count > 1 else ""
-            yield f"    {stage.name}: from {format_time(stage.begin)} to {format_time(end)}{divided}"
+            yield f"    {stage.name}: from {format_time(stage.begin)} to {format_time(last.end)}{divided}"
         if id(stage.configuration) in known:
             continue
         known.add(id(stage.configuration))

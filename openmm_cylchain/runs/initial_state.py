@@ -167,6 +167,7 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
         sum(own.count for own in configuration.filaments if not own.is_reserve),
     )
     for group in configuration.filaments:
+        first = len(filaments)
         if group.is_reserve:
             _add_reserve(filaments, group, kinetics, configuration.tables)
             continue
@@ -185,12 +186,10 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
             if planar is not None and group.planar:
                 planar.add(number, nodes, group.closed)
             _add(filaments, group, nodes, control_points, kinetics)
+        if not group.active:
+            for number in range(first, len(filaments)):
+                filaments.set_aside(number)
     messages.finish()
-    first = 0
-    for group in configuration.filaments:
-        for number in range(first, first + group.count) if not group.active else ():
-            filaments.set_aside(number)
-        first += group.count
     if configuration.contacts is not None:
         for number, filament in enumerate(filaments):
             if not filament.type.segment_kind.straight:

@@ -84,7 +84,10 @@ def measure(configuration, run):
     """What matters of a run that is complete: a list of Measure, empty for free filaments; see ``load_run``."""
     ends = (0, len(run) - 1)
     found = [
-        *((name, dict(zip(("first", "last"), values))) for name, values in _of_networks(configuration, run, ends)),
+        *(
+            (name, {end: value for end, value in zip(("first", "last"), values) if math.isfinite(value)})
+            for name, values in _of_networks(configuration, run, ends)
+        ),
         *_of_gliding(configuration, run),
         *_of_forces(configuration, run),
         *_of_growth(configuration, run),
@@ -102,12 +105,13 @@ def course(configuration, run):
         return None
     if GYRATION in found:
         radii = np.array(found.pop(GYRATION))
-        found["radius of gyration of all, over that at the start"] = radii / radii[0]
+        there = radii[np.isfinite(radii)]
+        found["radius of gyration of all, over that at the start"] = radii / there[0] if len(there) else radii
     return Course(run.times[frames] / MILLISECOND, found)
 
 
 def _of_networks(configuration, run, frames):
-    # Names with their values in frames.
+    # Names with their values in frames: NaN where no filament is there.
     joined = bool(configuration.linkers or configuration.links or configuration.contacts or configuration.walls)
     if len(run.filaments) < 2 or not (joined or any(group.propulsion for group in configuration.filaments)):
         return
@@ -138,7 +142,7 @@ def _shortest(run):
 
 def _order(run, frame):
     vectors = [segment_vectors(own, each.ring) for each, own in zip(run.filaments, run.curves(frame))]
-    return analysis.order_parameter(np.concatenate(vectors))
+    return analysis.order_parameter(np.concatenate(vectors)) if any(map(len, vectors)) else math.nan
 
 
 def _bundled(run, frame, gap, overlap):
@@ -163,7 +167,8 @@ def _count(run, frame):
 
 
 def _radius(run, frame):
-    return math.sqrt(float(np.var(np.concatenate(run.curves(frame)), axis=0).sum()))
+    points = np.concatenate(run.curves(frame))
+    return math.sqrt(float(np.var(points, axis=0).sum())) if len(points) else math.nan
 
 
 def _of_gliding(configuration, run):

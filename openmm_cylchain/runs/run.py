@@ -81,9 +81,8 @@ def run(configuration, output, resume=False):
         After SIGINT or SIGTERM.
     """
     stages = stages_of(configuration)
-    if len(stages) > 1 and not resume:
-        check_stages(stages)
-    first = create_simulation(stages[0].configuration)
+    checked = len(stages) > 1 and not resume
+    first = check_stages(stages) if checked else create_simulation(stages[0].configuration)
     with RunDirectory(output) as directory:
         checkpoint = directory.claim(configuration, resume)
         if checkpoint is not None and checkpoint.step == configuration.simulation.steps:
@@ -109,7 +108,7 @@ def run(configuration, output, resume=False):
             print(f"Resuming at step {checkpoint.step}, {format_time(stage.time(checkpoint.step))}{where}.")
         try:
             with Signals() as signals:
-                progress = _Progress(stages, 0 if checkpoint is None else checkpoint.step)
+                progress = RunProgress(stages[-1].end, 0.0 if checkpoint is None else stage.time(checkpoint.step))
                 try:
                     _run_stages(stages, stage, first, current, directory, checkpoint, signals, progress)
                 finally:
@@ -132,15 +131,16 @@ def _run_stages(stages, stage, first, current, directory, checkpoint, signals, p
             )
         if stage.number == len(stages) - 1:
             return
-        stage, before = stages[stage.number + 1], current
-        current = stage_simulation(stage, first)
+        stage = stages[stage.number + 1]
+        after = stage_simulation(stage, first)
         with naming_stage(stage):
-            carry_over(before, current, stage, seed)
+            carry_over(current, after, stage, seed)
+        current = after
         _write_crosslinks(directory, current[0], stages, stage.first_step)
 
 
 def check_stages(stages):
-    """Raise InputError if a stage cannot be simulated that comes after the first one."""
+    """The Simulation of the first stage and its BuiltSystem; InputError if any stage cannot be simulated."""
     first, known = None, set()
     for stage in stages:
         if stage.is_piece or id(stage.configuration) in known:
@@ -149,6 +149,7 @@ def check_stages(stages):
         with naming_stage(stage):
             current = create_simulation(stage.configuration) if first is None else stage_simulation(stage, first)
         first = first or current
+    return first
 
 
 @contextlib.contextmanager
@@ -240,21 +241,6 @@ def _restore(context, checkpoint, engine):
             f"The checkpoint cannot be loaded: {error}. Resume on the machine and with the OpenMM version on which "
             "the run was started."
         ) from None
-
-
-class _Progress:
-    # Of all stages.
-    def __init__(self, stages, step):
-        self._stages = stages
-        self._progress = RunProgress(stages[-1].end, stage_at(stages, step).time(step), 1.0)
-        self._step = step
-
-    def update(self, step):
-        self._step = step
-        self._progress.update(stage_at(self._stages, step).time(step))
-
-    def finish(self):
-        self._progress.finish(stage_at(self._stages, self._step).time(self._step))
 
 
 class Recorder:
@@ -375,7 +361,7 @@ class Recorder:
                     f"Interrupted at step {self._step} of {self._stages[-1].last_step}; a checkpoint is written. "
                     "Continue with the same command and --resume.",
                 )
-            progress.update(self._step)
+            progress.update(self._stage.time(self._step))
         return checkpoint
 
     def _timed_steps(self, steps):
@@ -430,7 +416,7 @@ class Recorder:
                     segment=min(node, own.segments - 1),
                     step=self._step,
                 )
-        if curved or self._grows:
+        if curved or self._grows or not len(filaments):
             raise InstabilityError(
                 f"The energy is not finite in step {self._step}. Use a smaller time step.", step=self._step
             )

@@ -9,14 +9,15 @@ import numpy as np
 from ..analysis.statistics import mean_with_error
 from ..output.read_tables import read_growth, read_reports, read_table
 from ..output.run_tables import MILLISECOND
+from ..units.quantities import TIME
+from ..units.text import parse_quantity
 from .configuration import linker_labels
 from .figure_style import FONT_SIZE
-from .stages import stages_of
+from .stages import named_stages
 
 _ENERGIES = ("stretching energy per segment (kT)", "bending energy per joint (kT)", "mean end-to-end distance (nm)")
 _FEWEST = 2
 _TIME = re.compile(r"time \((.*)\)")
-_UNITS = {"s": 1e12, "ms": 1e9, "µs": 1e6, "us": 1e6, "ns": 1e3, "ps": 1.0}
 _MOST_LINES, _MOST_NAMES = 60, 12
 
 
@@ -31,17 +32,6 @@ class StageSummary:
     begin: float
     end: float
     values: dict
-
-
-def named_stages(configuration):
-    """Stages of a run, with their pieces taken together: (first, last) Stage of each."""
-    found = []
-    for stage in stages_of(configuration):
-        if stage.is_piece:
-            found[-1] = found[-1][0], stage
-        else:
-            found.append((stage, stage))
-    return found
 
 
 def as_summarised(configuration):
@@ -67,7 +57,7 @@ def frames_of_last_stage(configuration):
     """A slice of the frames of a run: those in its last stage, or all if it has none."""
     if not configuration.stages:
         return slice(None)
-    first, last = named_stages(configuration)[-1]
+    first, last = named_stages(configuration.stages)[-1]
     return slice(min(first.first_report + 1, last.first_report + last.reports - 1), None)
 
 
@@ -76,7 +66,7 @@ def summarise_stages(configuration, directory):
     if not configuration.stages:
         return []
     columns = dict(_columns(configuration, directory))
-    return [_summarise(first, last, columns) for first, last in named_stages(configuration)]
+    return [_summarise(first, last, columns) for first, last in named_stages(configuration.stages)]
 
 
 def _columns(configuration, directory):
@@ -128,14 +118,14 @@ def mark_stages(axes, configuration, low=None):
     """
     if not configuration.stages:
         return
-    stages = named_stages(configuration)
+    stages = named_stages(configuration.stages)
     if len(stages) > _MOST_LINES:
         return
     for axis in axes:
         unit = _TIME.fullmatch(axis.get_xlabel())
         if unit is None:
             continue
-        length = _UNITS[unit[1]]
+        length = parse_quantity(f"1 {unit[1]}", TIME, "the unit")
         for first, _ in stages:
             if first.number:
                 axis.axvline(first.begin / length, color="0.55", linewidth=0.8, linestyle=(0, (4, 3)), zorder=0)

@@ -6,12 +6,14 @@ What a message says of a value that a stage has set is said at the line of that 
 
 import contextlib
 import dataclasses
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import InputError, InstabilityError
 from ..units.quantities import TIME
+from ..units.text import format_time
 from .keys import ConfigurationError, Place, Quantity
 from .stage_changes import apply_stage, in_unit_of
 from .table import UnknownKeyError
@@ -83,12 +85,17 @@ class Stage:
         return settings.steps // settings.steps_per_report
 
     @property
+    def report_steps(self):
+        """Those of its reports, (reports,)."""
+        return self.first_step + self.configuration.simulation.steps_per_report * np.arange(1, self.reports + 1)
+
+    @property
     def end(self):
         """Time in ps."""
         return self.time(self.last_step)
 
     def time(self, step):
-        """That of a step, in ps."""
+        """That of a step, or of several, in ps."""
         return self.begin + (step - self.first_step) * self.configuration.simulation.time_step
 
 
@@ -100,6 +107,22 @@ def stages_of(configuration):
 def stage_at(stages, step):
     """The Stage in which a step is taken: the first one for zero."""
     return next(own for own in stages if step <= own.last_step)
+
+
+def named_stages(stages):
+    """The stages with their pieces taken together: (first, last) Stage of each."""
+    found = []
+    for stage in stages:
+        if stage.is_piece:
+            found[-1] = found[-1][0], stage
+        else:
+            found.append((stage, stage))
+    return found
+
+
+def time_steps_in_words(stages):
+    """The time steps of stages as text, each once."""
+    return " and ".join(dict.fromkeys(format_time(own.configuration.simulation.time_step) for own in stages))
 
 
 @contextlib.contextmanager
@@ -119,19 +142,12 @@ def _in_words(stage):
 
 def frame_steps(configuration):
     """The steps of all reports of a run, (frames,)."""
-    parts = [np.zeros(1, dtype=int)]
-    for own in stages_of(configuration):
-        parts.append(own.first_step + own.configuration.simulation.steps_per_report * np.arange(1, own.reports + 1))
-    return np.concatenate(parts)
+    return np.concatenate([np.zeros(1, dtype=int), *(own.report_steps for own in stages_of(configuration))])
 
 
 def frame_times(configuration):
     """The times of all reports of a run in ps, (frames,)."""
-    parts = [np.zeros(1)]
-    for own in stages_of(configuration):
-        settings = own.configuration.simulation
-        parts.append(own.begin + settings.steps_per_report * settings.time_step * np.arange(1, own.reports + 1))
-    return np.concatenate(parts)
+    return np.concatenate([np.zeros(1), *(own.time(own.report_steps) for own in stages_of(configuration))])
 
 
 @dataclass(frozen=True)
@@ -169,7 +185,7 @@ def read_stages(raw, kinds, read):
         text = "[simulation] duration is said by [[stage]] tables: leave it out, or give it as that of a first stage."
         raise ConfigurationError(text, _DURATION)
     stages, reset, known = [], [], {}
-    for leaf in _leaves(raw[STAGE.name], ("stage",), "", _Count()):
+    for leaf in _leaves(raw[STAGE.name], ("stage",), "", itertools.count(1)):
         changes = apply_stage(_as_they_are(tables) if stages else tables, leaf.table, leaf.place, kinds)
         pieces = _pieces(leaf, changes)
         for piece in range(pieces):
@@ -182,11 +198,6 @@ def read_stages(raw, kinds, read):
             reset.append(frozenset(moved) if piece == 0 else frozenset())
         tables = changes.resolved(1.0)
     return _with_tethers(stages, reset)
-
-
-class _Count:
-    def __init__(self):
-        self.done = 0
 
 
 def _leaves(tables, path, before, count):
@@ -202,8 +213,7 @@ def _leaves(tables, path, before, count):
         for repeat in range(entries["repeat"]):
             label = before + (name if entries["repeat"] == 1 else f"{name} {repeat + 1}")
             if inner is None:
-                count.done += 1
-                if count.done > _MOST_STAGES:
+                if next(count) > _MOST_STAGES:
                     raise place.error(f"makes more than {_MOST_STAGES} stages.")
                 if "duration" not in entries:
                     raise place.error(f"lacks the key 'duration': add a line such as {STAGE.keys[1].line}")

@@ -21,7 +21,7 @@ def run_with_summary(configuration, output, resume=False):
     configuration = as_summarised(configuration)
     directory = RunDirectory(output)
     trajectory = load_trajectory(configuration, directory)
-    groups = summarise(configuration, trajectory[frames_of_last_stage(configuration)])
+    groups = summarise(configuration, trajectory.slice(frames_of_last_stage(configuration), copy=False))
     linkers = summarise_linkers(configuration, directory)
     own = load_run(directory)
     measures = measure(configuration, own)

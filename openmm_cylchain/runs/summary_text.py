@@ -10,7 +10,7 @@ from ..output.files import write_atomically
 from ..output.run_tables import MILLISECOND
 from ..units.text import format_time, format_with_error
 from ..version import __version__
-from .stages import stages_of
+from .stages import stages_of, time_steps_in_words
 from .summary import AGREEMENT_FRACTION, AGREEMENT_SIGMA, NOT_COMPARABLE
 
 _STAGES_IN_TABLE, _MOST_STAGES = 4, 12
@@ -64,7 +64,7 @@ def format_summary(configuration, groups, linkers=(), measures=(), growth=(), po
     settings = configuration.simulation
     lines = [
         f"{configuration.title or 'Run'}: {format_time(stages_of(configuration)[-1].end)} in steps of "
-        f"{_time_steps(configuration)}, scheme {settings.scheme}"
+        f"{time_steps_in_words(stages_of(configuration))}, scheme {settings.scheme}"
     ]
     if stages:
         lines += ["", *_table_of_stages(stages)]
@@ -94,11 +94,6 @@ def format_summary(configuration, groups, linkers=(), measures=(), growth=(), po
     verdicts = {observable.verdict for group in groups for observable in group.observables}
     lines += ["", *(text for verdict, text in _EXPLANATIONS.items() if verdict in verdicts)]
     return "\n".join(lines).rstrip()
-
-
-def _time_steps(configuration):
-    every = (own.configuration.simulation.time_step for own in stages_of(configuration))
-    return " and ".join(dict.fromkeys(map(format_time, every)))
 
 
 def _mean_of_stage(value):

@@ -61,7 +61,7 @@ def make_whole(positions: Vectors, filaments: Filaments, box_vectors: BoxVectors
     require_filaments(filaments)
     given = np.asarray(in_units_of(positions, LENGTH, "positions"))
     own = [*filaments.node_indices, *filaments.control_point_indices, filaments.attachment_indices]
-    last = int(np.concatenate(own).max())
+    last = int(np.concatenate(own).max(initial=-1))
     if given.ndim not in (2, 3) or given.shape[-1] != 3 or given.shape[-2] <= last:
         raise InputError(
             "positions must have the shape (particles, 3) or (frames, particles, 3) and hold the filaments, up to "

@@ -151,7 +151,7 @@ class RunReporter:
 
     def _begin(self, simulation):
         filaments, system, files = self._filaments, simulation.system, self._files
-        last = max(int(nodes.max()) for nodes in filaments.node_indices)
+        last = max(int(own.max()) for own in (*filaments.node_indices, *filaments.body_indices))
         if last >= system.getNumParticles():
             raise InputError("filaments must be those in the System that is simulated, but it has fewer particles.")
         time_step = simulation.integrator.getStepSize()._value

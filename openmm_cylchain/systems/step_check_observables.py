@@ -62,7 +62,7 @@ class Probe:
         self._filaments = filaments
         self.kinds = _kinds(filaments)
         self._system = system
-        chains = [*filaments.node_indices, *filaments.control_point_indices]
+        chains = [np.zeros(0, dtype=int), *filaments.node_indices, *filaments.control_point_indices]
         outside = np.setdiff1d(np.arange(system.getNumParticles()), np.concatenate(chains))
         mobile = [system.getParticleMass(int(index))._value != 0.0 for index in outside]
         self._particles = outside[np.array(mobile, dtype=bool)]

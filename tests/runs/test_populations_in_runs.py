@@ -21,8 +21,10 @@ from openmm_cylchain.cli import main
 from openmm_cylchain.output.read_tables import read_reports
 from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.initial_state import build_system
+from openmm_cylchain.runs.measures import GYRATION, ORDER
 from openmm_cylchain.runs.run import create_simulation, run
 from openmm_cylchain.runs.steady_populations import steady_population
+from openmm_cylchain.runs.summarised_run import run_with_summary
 from openmm_cylchain.scans.quantities import read_quantities
 from support.configurations import COMING_AND_GOING
 from support.run_figures import rendered
@@ -103,6 +105,18 @@ def test_a_run_may_begin_without_filaments():
     own = own.replace('total_rate = "3 1/s"', 'rate = "1 nM/s"')
     (group,) = parse(box, own + GROWTH, filament="").filaments
     assert 1e12 * group.nucleation.whole_rate(np.diag([2000.0, 2000.0, 1000.0])) == pytest.approx(4e9 * 6.02214076e-10)
+
+
+@pytest.mark.parametrize("rate", ["1e-6", "20000"])
+def test_summary_of_a_network_that_begins_without_filaments(rate, tmp_path):
+    """In whose first frame there is nothing to measure, or in none."""
+    wall = '[[wall]]\nshape = "sphere"\nradius = "3 um"\nstiffness = "0.1 pN/nm"\n'
+    own = f'[[nucleation]]\ntype = "F_ACTIN"\nsegment_length = "108 nm"\ncount = 5\ntotal_rate = "{rate} 1/s"\n'
+    _, _, measures, *_ = run_with_summary(parse(wall, own + INSIDE + GROWTH, filament=""), tmp_path / "out")
+    found = {measure.name: measure for measure in measures}
+    assert found[ORDER].first is None and found[GYRATION].first is None
+    assert (found[ORDER].last is None) == (rate == "1e-6")
+    assert (tmp_path / "out" / "summary.png").exists()
 
 
 def test_they_begin_anywhere_in_a_periodic_box(tmp_path):

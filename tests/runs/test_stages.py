@@ -9,7 +9,7 @@ from openmm_cylchain import analysis
 from openmm_cylchain.cli import main
 from openmm_cylchain.errors import InputError
 from openmm_cylchain.output.read_tables import read_reports, read_table
-from openmm_cylchain.runs.configuration import parse_configuration
+from openmm_cylchain.runs.configuration import parse_configuration, read_configuration
 from openmm_cylchain.runs.dry_run import dry_run
 from openmm_cylchain.runs.run import run
 from openmm_cylchain.runs.run_directory import RunDirectory
@@ -104,6 +104,16 @@ def test_what_a_stage_says_is_there(tmp_path):
     assert [len(found.crosslinks(frame)) for frame in (0, 4, 5, 28)] == [0, 0, 1, 1]
     loads = read_reports(tmp_path / "out" / "wall_forces.csv")
     assert np.all(loads["load (pN)"][:17] == 0.0) and loads["mean over (ms)"][20].max() > 0.0
+
+
+def test_stages_that_are_the_same_have_one_configuration(tmp_path):
+    """Each of which is built once, to see that it can be, however often it comes."""
+    path = tmp_path / "run.toml"
+    path.write_text(MANY_CHANGES)
+    stages = read_configuration(path).stages
+    # Those of the two pieces of each squeeze.
+    assert all(stages[number].configuration is stages[number + 3].configuration for number in (3, 4))
+    assert {own.configuration.path for own in stages} == {str(path)}
 
 
 WASHED = """

@@ -232,8 +232,7 @@ def read_filaments(entries, table, solvent, box, folder, monomers):
         groups = _from_nodes(entries, kind) if "nodes" in entries else _placed(entries, kind, box)
     growth = None if entries["growth"] is None else read_growth(entries["growth"], monomers)
     own = {"planar": True} if entries["planar"] else {}
-    common = {"propulsion": entries["propulsion"], "height": entries["height"], "table": table}
-    common["active"] = entries["active"]
+    common = {key: entries[key] for key in ("propulsion", "height", "active")} | {"table": table}
     if growth is not None and not entries["active"]:
         raise entries.at("active").error("is false, but these filaments grow: let them begin by [[nucleation]].")
     if growth is None:
