@@ -7,6 +7,18 @@
 using namespace cylchain;
 using namespace std;
 
+/** Take a vector that begins at the point of a wall to where the middle of its round face is nearest. */
+static void beginInMiddle(const Wall& wall, double* r) {
+    const double* v = wall.vector;
+    double along = 0;
+    if (wall.shape == WallShape::Cylinder)
+        along = dot(v, r);
+    else if (wall.shape == WallShape::Capsule)
+        along = max(-1.0, min(1.0, dot(v, r)/dot(v, v)));
+    for (int k = 0; k < 3; k++)
+        r[k] -= along*v[k];
+}
+
 bool cylchain::encloses(const Wall& wall, const double* position) {
     const double* v = wall.vector;
     double r[3];
@@ -23,12 +35,9 @@ bool cylchain::encloses(const Wall& wall, const double* position) {
             const double along = dot(v, r);
             return dot(r, r)-along*along <= wall.length*wall.length;
         }
-        case WallShape::Capsule: {
-            const double along = max(-1.0, min(1.0, dot(v, r)/dot(v, v)));
-            for (int k = 0; k < 3; k++)
-                r[k] -= along*v[k];
+        case WallShape::Capsule:
+            beginInMiddle(wall, r);
             return dot(r, r) <= wall.length*wall.length;
-        }
         case WallShape::Box:
             return r[0] >= 0 && r[1] >= 0 && r[2] >= 0 && position[0] <= v[0] && position[1] <= v[1] &&
                     position[2] <= v[2];
@@ -119,18 +128,6 @@ static double findDepthInEllipsoid(const Wall& wall, const double* r, double* gr
     return depth;
 }
 
-/** How many vectors from its point the middle of a round face is that is nearest to a position. */
-static double findPlaceOfMiddle(const Wall& wall, const double* r) {
-    switch (wall.shape) {
-        case WallShape::Cylinder:
-            return dot(wall.vector, r);
-        case WallShape::Capsule:
-            return max(-1.0, min(1.0, dot(wall.vector, r)/dot(wall.vector, wall.vector)));
-        default:
-            return 0;
-    }
-}
-
 double cylchain::findDepth(const Wall& wall, int face, const double* position, double radius, double* gradient) {
     const double* v = wall.vector;
     double r[3];
@@ -151,9 +148,7 @@ double cylchain::findDepth(const Wall& wall, int face, const double* position, d
         case WallShape::Cylinder:
         case WallShape::Capsule: {
             const bool hasAxis = wall.shape != WallShape::Sphere;
-            const double along = findPlaceOfMiddle(wall, r);
-            for (int k = 0; k < 3; k++)
-                r[k] -= along*v[k];
+            beginInMiddle(wall, r);
             const double distance = sqrt(dot(r, r));
             const double up[] = {0, 0, 1};
             if (!(distance > 1e-12*wall.length) && hasAxis)
