@@ -1,5 +1,6 @@
 #include "kinetics/LinkerKinetics.h"
 #include "lanes/Noise.h"
+#include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -83,13 +84,9 @@ bool LinkerKinetics::proposeToFree(const Linker& linker, const double* position,
     if (chosen >= around.numPieces || !toProposed(number, cells.getAround(around, chosen), where, sites, found))
         return false;
     double vector[3];
-    locate(contours.findPlace(found.chain, found.position), step.positions, step.boxes.segments, vector);
-    for (int k = 0; k < 3; k++)
-        vector[k] -= position[k];
-    if (step.boxes.distances != nullptr)
-        takeToNearestImage(vector, step.boxes.distances);
+    vectorTo(found, position, step, vector);
     const double reach = system.hands[number].reach;
-    return vector[0]*vector[0]+vector[1]*vector[1]+vector[2]*vector[2] <= reach*reach;
+    return dot(vector, vector) <= reach*reach;
 }
 
 /**

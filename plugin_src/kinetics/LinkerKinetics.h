@@ -187,6 +187,7 @@ private:
     void removeUnbound(LinkerState& state);
     void takeTogether(LinkerState& state, const KineticStep& step, Count& count);
     const SegmentCells::Around& lookAround(const Linker& linker, int side, const KineticStep& step,
+    void vectorTo(const HandPlace& place, const double* from, const KineticStep& step, double* vector) const;
             SegmentCells::Around& ofAnchor) const;
     bool proposePlace(const Linker& linker, int side, const KineticStep& step, RandomNumbers& random,
             const Sites* sites, HandPlace& found) const;
