@@ -55,16 +55,14 @@ void LinkerKinetics::diffuse(LinkerState& state, const KineticStep& step, int fi
     for (int n = 0; n < count; n++) {
         const int own = watches[indices[n]].kind;
         const Kind& kind = kinds[own];
-        const vector<Wall>& walls = system.wallsOf(system.types[own/4]);
-        const LinkerRegion region(walls, step.boxes.distances);
-        const double size = 2*sqrt(6*kind.diffusion*step.stepSize);
+        const LinkerRegion region(system.wallsOf(system.types[own/4]), step.boxes.distances);
         double* const position = &state.positions[3*indices[n]];
         double moved[3];
         for (int k = 0; k < 3; k++)
-            moved[k] = position[k]+size*((words[4*n+k]+0.5)*WORD-0.5);
+            moved[k] = position[k]+kind.width*((words[4*n+k]+0.5)*WORD-0.5);
         if (kind.isPlanar)
             moved[2] = position[2];
-        if (walls.empty() || region.encloses(moved))
+        if (region.encloses(moved))
             copy(moved, moved+3, position);
         else if (!region.encloses(position)) {
             // Walls have moved.

@@ -29,7 +29,7 @@ void LinkerKinetics::findKinds(const KineticStep& step) {
         kind.pulls = held == 3;
         kind.isFree = type.diffuses() && held == 0;
         kind.isPlanar = type.planar;
-        kind.diffusion = type.diffusion;
+        kind.width = kind.isFree ? 2*sqrt(6*type.diffusion*step.stepSize) : 0;
         bool known = true;
         for (int side = 0; side < 2; side++) {
             if (type.hands[side] < 0)

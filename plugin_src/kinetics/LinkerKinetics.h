@@ -123,8 +123,8 @@ private:
         double perPiece = 0;
         /** Of a hand that walks without a load, towards the plus end, if the linker holds nothing else. */
         double velocity = 0;
-        /** Of linkers that are not bound and have positions. */
-        double diffusion = 0;
+        /** Of linkers that are not bound and have positions: the width of the distribution of a move. */
+        double width = 0;
         /** If not zero, they are taken to have so many pieces around them, wherever they are. */
         unsigned most = 0;
         bool isFree = false, isPlanar = false;
