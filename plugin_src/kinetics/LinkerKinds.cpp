@@ -62,7 +62,7 @@ LinkerKinetics::Watch LinkerKinetics::watch(const Linker& linker) const {
     const int held = (linker.isHeld(0) ? 1 : 0)+(linker.isHeld(1) ? 2 : 0);
     // That of nothing around.
     Watch watch = {4*linker.type+held, 2*cells.getNumPieces()};
-    if (isFree(linker)) {
+    if (system.isFree(linker)) {
         watch.where = static_cast<int>(linker.number);
         return watch;
     }

@@ -78,13 +78,13 @@ bool cylchain::placeFreeLinkers(LinkerState& state, const LinkerSystem& system, 
         return true;
     }
     const NoiseKey key = {seed, LEVEL_OF_FIRST_POSITIONS, state.steps};
-    state.positions.resize(3*state.linkers.size(), numeric_limits<double>::quiet_NaN());
+    state.positions.resize(3*state.linkers.size(), NO_POSITION);
     for (size_t i = 0; i < state.linkers.size(); i++) {
         const Linker& linker = state.linkers[i];
         const LinkerType& type = system.types[linker.type];
         double* const position = &state.positions[3*i];
-        if (!type.diffuses() || linker.isHeld(0) || linker.isHeld(1)) {
-            fill(position, position+3, numeric_limits<double>::quiet_NaN());
+        if (!system.isFree(linker)) {
+            fill(position, position+3, NO_POSITION);
             continue;
         }
         if (!isnan(position[0]))
