@@ -49,6 +49,62 @@ bool cylchain::encloses(const Wall& wall, const double* position) {
     return false;
 }
 
+bool cylchain::encloses(const vector<Wall>& walls, const double* position) {
+    for (const Wall& wall : walls)
+        if (!encloses(wall, position))
+            return false;
+    return true;
+}
+
+/** The corners of a box around a closed wall; false if it is open. */
+static bool findBoundsOf(const Wall& wall, double* lower, double* upper) {
+    if (wall.shape == WallShape::Plane || wall.shape == WallShape::Slab || wall.shape == WallShape::Cylinder)
+        return false;
+    for (int k = 0; k < 3; k++) {
+        const double ofVector = wall.shape == WallShape::Sphere ? 0 : fabs(wall.vector[k]);
+        const double half = ofVector+(wall.shape == WallShape::Ellipsoid ? 0 : wall.length);
+        lower[k] = wall.shape == WallShape::Box ? wall.point[k] : wall.point[k]-half;
+        upper[k] = wall.shape == WallShape::Box ? wall.vector[k] : wall.point[k]+half;
+    }
+    return true;
+}
+
+/** The corners of a box around what is in a cylinder and in a slab across it; false if they are others. */
+static bool findBoundsOf(const Wall& cylinder, const Wall& slab, double* lower, double* upper) {
+    if (cylinder.shape != WallShape::Cylinder || slab.shape != WallShape::Slab ||
+            fabs(dot(cylinder.vector, slab.vector)) < 1-1e-9)
+        return false;
+    double between[3];
+    for (int k = 0; k < 3; k++)
+        between[k] = slab.point[k]-cylinder.point[k];
+    const double along = dot(cylinder.vector, between);
+    for (int k = 0; k < 3; k++) {
+        const double axis = cylinder.vector[k], middle = cylinder.point[k]+along*axis;
+        const double half = 0.5*slab.length*fabs(axis)+cylinder.length*sqrt(max(0.0, 1-axis*axis));
+        lower[k] = middle-half;
+        upper[k] = middle+half;
+    }
+    return true;
+}
+
+bool cylchain::findBounds(const vector<Wall>& walls, double* lower, double* upper) {
+    for (const Wall& wall : walls)
+        if (findBoundsOf(wall, lower, upper))
+            return true;
+    for (const Wall& cylinder : walls)
+        for (const Wall& slab : walls)
+            if (findBoundsOf(cylinder, slab, lower, upper))
+                return true;
+    return false;
+}
+
+bool cylchain::isBounded(const vector<Wall>& walls, bool periodic) {
+    double lower[3], upper[3];
+    return findBounds(walls, lower, upper) || (periodic && none_of(walls.begin(), walls.end(), [] (const Wall& wall) {
+        return wall.shape == WallShape::Plane;
+    }));
+}
+
 int cylchain::countFaces(const Wall& wall) {
     switch (wall.shape) {
         case WallShape::Slab:

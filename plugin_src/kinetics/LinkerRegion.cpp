@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 
 using namespace cylchain;
 using namespace std;
@@ -28,7 +27,7 @@ bool LinkerRegion::isBeyond(const double* center, double radius) const {
 bool LinkerRegion::draw(RandomNumbers& random, bool planar, double* position) const {
     // The box around a closed wall, or else a cell of the periodic box around the middle of a wall.
     double origin[3] = {0, 0, 0}, edges[9] = {}, lower[3], upper[3];
-    if (findBounds(lower, upper))
+    if (findBounds(walls, lower, upper))
         for (int k = 0; k < 3; k++) {
             origin[k] = lower[k];
             edges[4*k] = upper[k]-lower[k];
