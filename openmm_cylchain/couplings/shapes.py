@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
+from ..mechanics.geometry import directions_across
 from ..units.quantities import LENGTH, in_units_of, positive, unit_vector, vector
 from ..units.types import FloatArray, FloatOrArray, Scalar, Vector, Vectors
 
@@ -105,13 +106,6 @@ def number(value: float) -> str:
 def _along(point, direction):
     terms = (f"{number(n)}*({name}-{number(p)})" for name, n, p in zip("xyz", direction, point))
     return f"({'+'.join(terms)})"
-
-
-def _across(axis):
-    # Two directions orthogonal to an axis and to each other.
-    first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    first /= np.linalg.norm(first)
-    return first, np.cross(axis, first)
 
 
 def _beyond(expression):
@@ -270,7 +264,7 @@ class Cylinder(Face):
 
     @property
     def expression(self) -> str:
-        first, second = (_along(self.point, direction) for direction in _across(self.axis))
+        first, second = (_along(self.point, direction) for direction in directions_across(self.axis))
         return _beyond(f"sqrt({first}^2+{second}^2+{_TINY})-{number(self.radius)}")
 
     @property
@@ -317,7 +311,7 @@ class Capsule(Face):
 
     @property
     def expression(self) -> str:
-        directions = (*_across(self.axis), self.axis)
+        directions = (*directions_across(self.axis), self.axis)
         first, second, along = (_along(self.center, direction) for direction in directions)
         beyond = f"max(0, abs({along})-{number(0.5 * self.length)})"
         return _beyond(f"sqrt({first}^2+{second}^2+{beyond}^2+{_TINY})-{number(self.radius)}")

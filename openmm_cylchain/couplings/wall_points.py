@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import InputError
+from ..mechanics.geometry import directions_across
 from ..units.quantities import LENGTH, vector, whole_number, whole_numbers
 from ..units.types import FloatArray, Vector
 from .shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
@@ -72,19 +73,12 @@ def random_points_on(
     return np.clip(found[:count], low, high)
 
 
-def _tangents(normal):
-    """Two unit vectors across a unit vector and each other."""
-    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    first /= np.linalg.norm(first)
-    return first, np.cross(normal, first)
-
-
 def _corners(low, high):
     return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
 
 
 def _on_plane(plane, count, generator, low, high):
-    across = np.array(_tangents(plane.normal))
+    across = np.array(directions_across(plane.normal))
     extent = (_corners(low, high) - plane.point) @ across.T
     return plane.point + generator.uniform(extent.min(axis=0), extent.max(axis=0), (count, 2)) @ across
 
@@ -96,7 +90,7 @@ def _on_slab(slab, count, generator, low, high):
 
 def _on_cylinder(cylinder, count, generator, low, high):
     heights = (_corners(low, high) - cylinder.point) @ cylinder.axis
-    first, second = _tangents(cylinder.axis)
+    first, second = directions_across(cylinder.axis)
     angle = generator.uniform(0.0, 2.0 * math.pi, (count, 1))
     height = generator.uniform(heights.min(), heights.max(), (count, 1))
     return cylinder.point + height * cylinder.axis + cylinder.radius * (np.cos(angle) * first + np.sin(angle) * second)

@@ -20,6 +20,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from ..mechanics.geometry import directions_across
 from ..units.quantities import TEMPERATURE, positive, thermal_energy, true_or_false
 from ..units.types import FloatArray, FloatOrArray, Scalar
 
@@ -219,13 +220,11 @@ def _tangents_in_space(cosines, generator, direction):
     if direction is None:
         direction = generator.normal(size=3)
     tangent = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
-    normal = np.cross(tangent, np.eye(3)[np.argmin(np.abs(tangent))])
-    normal /= np.linalg.norm(normal)
     # Rows of a frame are the tangent, the normal and the binormal; each joint turns it in its own axes.
     sines = np.sqrt((1.0 - cosines) * (1.0 + cosines))
     along, across, none = np.cos(azimuths), np.sin(azimuths), np.zeros(len(azimuths))
     turns = [cosines, sines * along, sines * across, -sines, cosines * along, cosines * across, none, -across, along]
-    frame = np.stack([tangent, normal, np.cross(tangent, normal)])
+    frame = np.stack([tangent, *directions_across(tangent)])
     tangents = np.empty((len(cosines) + 1, 3))
     tangents[0] = tangent
     for joint, turn in enumerate(np.stack(turns, axis=1).reshape(-1, 3, 3)):

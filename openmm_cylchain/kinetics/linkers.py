@@ -201,7 +201,7 @@ def is_closed(walls: Sequence[tuple[Any, ...]], periodic: bool) -> bool:
     if any(name in _CLOSED for name in names) or (periodic and "plane" not in names):
         return True
     axes = [
-        [np.array(wall[2]._value if hasattr(wall[2], "_value") else wall[2]) for wall in walls if wall[0] == name]
+        [np.array(getattr(wall[2], "_value", wall[2])) for wall in walls if wall[0] == name]
         for name in ("cylinder", "slab")
     ]
     return any(abs(first @ second) > 1.0 - 1e-9 for first in axes[0] for second in axes[1])

@@ -49,6 +49,13 @@ def joint_cosines(tangents: FloatArray, closed: bool = False) -> FloatArray:
     return np.einsum("ij,ij->i", before, behind)
 
 
+def directions_across(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Two unit vectors (3,) orthogonal to the unit vector ``axis`` and to each other: with it, a right-handed frame."""
+    first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    first /= np.linalg.norm(first)
+    return first, np.cross(axis, first)
+
+
 def regular_polygon(segments: int, segment_length: float, center: FloatArray, normal: FloatArray) -> FloatArray:
     """Nodes (segments, 3) of a regular polygon, counter-clockwise around the unit vector ``normal``."""
     angles = 2.0 * np.pi * np.arange(segments) / segments

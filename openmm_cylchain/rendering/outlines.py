@@ -4,6 +4,7 @@ import numpy as np
 
 from ..analysis.runs import Run
 from ..couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere
+from ..mechanics.geometry import directions_across
 from ..units.types import FloatArray
 
 _ROUND = 72
@@ -69,25 +70,18 @@ def _outline_of_capsule(wall):
 
 
 def _circle(normal):
-    first, second = _across(normal)
+    first, second = directions_across(normal)
     angles = np.linspace(0.0, 2.0 * np.pi, _ROUND + 1)[:, None]
     return np.cos(angles) * first + np.sin(angles) * second
 
 
-def _across(normal):
-    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    first /= np.linalg.norm(first)
-    return first, np.cross(normal, first)
-
-
 def _grid(point, normal, points):
-    first, second = _across(normal)
-    ranges = []
-    for direction in (first, second):
+    sides = []
+    for direction in directions_across(normal):
         heights = (points - point) @ direction
-        ranges.append((heights.min(), heights.max()))
+        sides.append((direction, heights.min(), heights.max()))
     lines = []
-    for (low, high), (start, end), along, aside in ((*ranges, first, second), (*ranges[::-1], second, first)):
+    for (along, low, high), (aside, start, end) in (sides, sides[::-1]):
         for place in np.linspace(low, high, 5):
             lines.append(point + np.array([place * along + start * aside, place * along + end * aside]))
     return lines

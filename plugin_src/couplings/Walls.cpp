@@ -7,6 +7,18 @@
 using namespace cylchain;
 using namespace std;
 
+/** Take a vector that begins at the point of a wall to where the middle of its round face is nearest. */
+static void beginInMiddle(const Wall& wall, double* r) {
+    const double* v = wall.vector;
+    double along = 0;
+    if (wall.shape == WallShape::Cylinder)
+        along = dot(v, r);
+    else if (wall.shape == WallShape::Capsule)
+        along = max(-1.0, min(1.0, dot(v, r)/dot(v, v)));
+    for (int k = 0; k < 3; k++)
+        r[k] -= along*v[k];
+}
+
 bool cylchain::encloses(const Wall& wall, const double* position) {
     const double* v = wall.vector;
     double r[3];
@@ -23,12 +35,9 @@ bool cylchain::encloses(const Wall& wall, const double* position) {
             const double along = dot(v, r);
             return dot(r, r)-along*along <= wall.length*wall.length;
         }
-        case WallShape::Capsule: {
-            const double along = max(-1.0, min(1.0, dot(v, r)/dot(v, v)));
-            for (int k = 0; k < 3; k++)
-                r[k] -= along*v[k];
+        case WallShape::Capsule:
+            beginInMiddle(wall, r);
             return dot(r, r) <= wall.length*wall.length;
-        }
         case WallShape::Box:
             return r[0] >= 0 && r[1] >= 0 && r[2] >= 0 && position[0] <= v[0] && position[1] <= v[1] &&
                     position[2] <= v[2];
@@ -38,6 +47,62 @@ bool cylchain::encloses(const Wall& wall, const double* position) {
             return dot(r, r) <= 1;
     }
     return false;
+}
+
+bool cylchain::encloses(const vector<Wall>& walls, const double* position) {
+    for (const Wall& wall : walls)
+        if (!encloses(wall, position))
+            return false;
+    return true;
+}
+
+/** The corners of a box around a closed wall; false if it is open. */
+static bool findBoundsOf(const Wall& wall, double* lower, double* upper) {
+    if (wall.shape == WallShape::Plane || wall.shape == WallShape::Slab || wall.shape == WallShape::Cylinder)
+        return false;
+    for (int k = 0; k < 3; k++) {
+        const double ofVector = wall.shape == WallShape::Sphere ? 0 : fabs(wall.vector[k]);
+        const double half = ofVector+(wall.shape == WallShape::Ellipsoid ? 0 : wall.length);
+        lower[k] = wall.shape == WallShape::Box ? wall.point[k] : wall.point[k]-half;
+        upper[k] = wall.shape == WallShape::Box ? wall.vector[k] : wall.point[k]+half;
+    }
+    return true;
+}
+
+/** The corners of a box around what is in a cylinder and in a slab across it; false if they are others. */
+static bool findBoundsOf(const Wall& cylinder, const Wall& slab, double* lower, double* upper) {
+    if (cylinder.shape != WallShape::Cylinder || slab.shape != WallShape::Slab ||
+            fabs(dot(cylinder.vector, slab.vector)) < 1-1e-9)
+        return false;
+    double between[3];
+    for (int k = 0; k < 3; k++)
+        between[k] = slab.point[k]-cylinder.point[k];
+    const double along = dot(cylinder.vector, between);
+    for (int k = 0; k < 3; k++) {
+        const double axis = cylinder.vector[k], middle = cylinder.point[k]+along*axis;
+        const double half = 0.5*slab.length*fabs(axis)+cylinder.length*sqrt(max(0.0, 1-axis*axis));
+        lower[k] = middle-half;
+        upper[k] = middle+half;
+    }
+    return true;
+}
+
+bool cylchain::findBounds(const vector<Wall>& walls, double* lower, double* upper) {
+    for (const Wall& wall : walls)
+        if (findBoundsOf(wall, lower, upper))
+            return true;
+    for (const Wall& cylinder : walls)
+        for (const Wall& slab : walls)
+            if (findBoundsOf(cylinder, slab, lower, upper))
+                return true;
+    return false;
+}
+
+bool cylchain::isBounded(const vector<Wall>& walls, bool periodic) {
+    double lower[3], upper[3];
+    return findBounds(walls, lower, upper) || (periodic && none_of(walls.begin(), walls.end(), [] (const Wall& wall) {
+        return wall.shape == WallShape::Plane;
+    }));
 }
 
 int cylchain::countFaces(const Wall& wall) {
@@ -119,18 +184,6 @@ static double findDepthInEllipsoid(const Wall& wall, const double* r, double* gr
     return depth;
 }
 
-/** How many vectors from its point the middle of a round face is that is nearest to a position. */
-static double findPlaceOfMiddle(const Wall& wall, const double* r) {
-    switch (wall.shape) {
-        case WallShape::Cylinder:
-            return dot(wall.vector, r);
-        case WallShape::Capsule:
-            return max(-1.0, min(1.0, dot(wall.vector, r)/dot(wall.vector, wall.vector)));
-        default:
-            return 0;
-    }
-}
-
 double cylchain::findDepth(const Wall& wall, int face, const double* position, double radius, double* gradient) {
     const double* v = wall.vector;
     double r[3];
@@ -151,9 +204,7 @@ double cylchain::findDepth(const Wall& wall, int face, const double* position, d
         case WallShape::Cylinder:
         case WallShape::Capsule: {
             const bool hasAxis = wall.shape != WallShape::Sphere;
-            const double along = findPlaceOfMiddle(wall, r);
-            for (int k = 0; k < 3; k++)
-                r[k] -= along*v[k];
+            beginInMiddle(wall, r);
             const double distance = sqrt(dot(r, r));
             const double up[] = {0, 0, 1};
             if (!(distance > 1e-12*wall.length) && hasAxis)

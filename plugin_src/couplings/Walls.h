@@ -74,6 +74,19 @@ const int MOST_FACES = 6;
 /** Whether a point is in the region. */
 bool encloses(const Wall& wall, const double* position);
 
+/** Whether a point is in the regions of all walls. */
+bool encloses(const std::vector<Wall>& walls, const double* position);
+
+/** Find the corners of a box around a closed wall, or a cylinder and a slab across it; false if there is none. */
+bool findBounds(const std::vector<Wall>& walls, double* lower, double* upper);
+
+/**
+ * Whether what is within all walls has a volume: a wall is closed, or a cylinder has a slab across it, or there is a
+ * periodic box, and no wall but slabs and cylinders. A half space and a box have none, since walls have no periodic
+ * images.
+ */
+bool isBounded(const std::vector<Wall>& walls, bool periodic);
+
 /** The number of faces. */
 int countFaces(const Wall& wall);
 

@@ -1,5 +1,6 @@
 #include "kinetics/LinkerKinetics.h"
 #include "lanes/Noise.h"
+#include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -28,11 +29,6 @@ double LinkerKinetics::freeRate(const LinkerType& type, int side) const {
     return own.bindingRate*(type.planar ? ratio : ratio*sqrt(ratio));
 }
 
-/** Whether a linker is of those that diffuse, and holds nothing. */
-bool LinkerKinetics::isFree(const Linker& linker) const {
-    return system.types[linker.type].diffuses() && !linker.isHeld(0) && !linker.isHeld(1);
-}
-
 /**
  * Move the linkers of a chunk that are free. Each coordinate moves by a number with a uniform distribution and the
  * variance 2 D h. Moves that would leave the region are not made, so that all of it stays equally likely.
@@ -54,16 +50,14 @@ void LinkerKinetics::diffuse(LinkerState& state, const KineticStep& step, int fi
     for (int n = 0; n < count; n++) {
         const int own = watches[indices[n]].kind;
         const Kind& kind = kinds[own];
-        const vector<Wall>& walls = system.wallsOf(system.types[own/4]);
-        const LinkerRegion region(walls, step.boxes.distances);
-        const double size = 2*sqrt(6*kind.diffusion*step.stepSize);
+        const LinkerRegion region(system.wallsOf(system.types[own/4]), step.boxes.distances);
         double* const position = &state.positions[3*indices[n]];
         double moved[3];
         for (int k = 0; k < 3; k++)
-            moved[k] = position[k]+size*((words[4*n+k]+0.5)*WORD-0.5);
+            moved[k] = position[k]+kind.width*((words[4*n+k]+0.5)*WORD-0.5);
         if (kind.isPlanar)
             moved[2] = position[2];
-        if (walls.empty() || region.encloses(moved))
+        if (region.encloses(moved))
             copy(moved, moved+3, position);
         else if (!region.encloses(position)) {
             // Walls have moved.
@@ -83,13 +77,9 @@ bool LinkerKinetics::proposeToFree(const Linker& linker, const double* position,
     if (chosen >= around.numPieces || !toProposed(number, cells.getAround(around, chosen), where, sites, found))
         return false;
     double vector[3];
-    locate(contours.findPlace(found.chain, found.position), step.positions, step.boxes.segments, vector);
-    for (int k = 0; k < 3; k++)
-        vector[k] -= position[k];
-    if (step.boxes.distances != nullptr)
-        takeToNearestImage(vector, step.boxes.distances);
+    vectorTo(found, position, step, vector);
     const double reach = system.hands[number].reach;
-    return vector[0]*vector[0]+vector[1]*vector[1]+vector[2]*vector[2] <= reach*reach;
+    return dot(vector, vector) <= reach*reach;
 }
 
 /**
@@ -110,12 +100,19 @@ bool LinkerKinetics::findRelease(const Linker& linker, int side, const KineticSt
     return region.isBeyond(center, reach) && region.draw(random, type.planar, position);
 }
 
-/** Put a linker somewhere whose last hand has let go because a chain has ended, within reach of where it was. */
-void LinkerKinetics::release(LinkerState& state, size_t index, int side, const double* center,
-        const KineticStep& step, RandomNumbers& random) const {
+/**
+ * Put a linker somewhere whose last hand has let go because a chain has ended, within reach of where it was.
+ *
+ * @param before    what the hand held
+ * @param contours  of the chains then
+ */
+void LinkerKinetics::release(LinkerState& state, size_t index, int side, const HandPlace& before,
+        const Contours& contours, const KineticStep& step, RandomNumbers& random) const {
     const LinkerType& type = system.types[state.linkers[index].type];
     const LinkerRegion region(system.wallsOf(type), step.boxes.distances);
     double* const position = &state.positions[3*index];
+    double center[3];
+    locate(contours.findPlace(before.chain, before.position), step.positions, step.boxes.segments, center);
     for (int i = 0; i < MOST_TRIES; i++) {
         drawAround(random, center, system.hands[type.hands[side]].reach, type.planar, position);
         if (region.encloses(position))
@@ -128,32 +125,21 @@ void LinkerKinetics::release(LinkerState& state, size_t index, int side, const d
 void LinkerKinetics::walkOne(LinkerState& state, size_t index, const KineticStep& step, Count& count) {
     Linker& linker = state.linkers[index];
     const int side = linker.hands[0].isBound() ? 0 : 1;
-    const bool diffuses = system.types[linker.type].diffuses();
-    double before[3] = {};
-    if (diffuses)
-        locate(placeOf(linker, side), step.positions, step.boxes.segments, before);
+    const HandPlace before = linker.hands[side];
     walkAll(linker, step, watches[index], count);
-    if (diffuses && isFree(linker)) {
+    if (system.isFree(linker)) {
         RandomNumbers random({step.seed, LEVEL_OF_RELEASE, state.steps}, step.force, linker.number);
-        release(state, index, side, before, step, random);
+        release(state, index, side, before, contours, step, random);
     }
 }
 
-/** Where linkers of a state were when chains ended that they held: by the lengths along chains before. */
-void LinkerKinetics::releaseFromEnds(LinkerState& state, const vector<HandPlace>& held, const Contours& before,
+/** Chains have grown or shrunk: a linker that diffuses may be free then. */
+void LinkerKinetics::releaseFromEnd(LinkerState& state, size_t index, const HandPlace* held, const Contours& before,
         const KineticStep& step) const {
-    state.positions.resize(3*state.linkers.size(), NO_POSITION);
-    for (size_t i = 0; i < state.linkers.size(); i++) {
-        if (!isFree(state.linkers[i]) || !isnan(state.positions[3*i]))
-            continue;
-        for (int side = 0; side < 2; side++)
-            if (held[2*i+side].isBound()) {
-                double center[3];
-                locate(before.findPlace(held[2*i+side].chain, held[2*i+side].position), step.positions,
-                        step.boxes.segments, center);
-                RandomNumbers random({step.seed, LEVEL_OF_ENDS, state.steps}, step.force, state.linkers[i].number);
-                release(state, i, side, center, step, random);
-                break;
-            }
-    }
+    const Linker& linker = state.linkers[index];
+    const int side = held[0].isBound() ? 0 : 1;
+    if (!held[side].isBound() || !system.isFree(linker))
+        return;
+    RandomNumbers random({step.seed, LEVEL_OF_ENDS, state.steps}, step.force, linker.number);
+    release(state, index, side, held[side], before, step, random);
 }

@@ -29,7 +29,7 @@ void LinkerKinetics::findKinds(const KineticStep& step) {
         kind.pulls = held == 3;
         kind.isFree = type.diffuses() && held == 0;
         kind.isPlanar = type.planar;
-        kind.diffusion = type.diffusion;
+        kind.width = kind.isFree ? 2*sqrt(6*type.diffusion*step.stepSize) : 0;
         bool known = true;
         for (int side = 0; side < 2; side++) {
             if (type.hands[side] < 0)
@@ -62,7 +62,7 @@ LinkerKinetics::Watch LinkerKinetics::watch(const Linker& linker) const {
     const int held = (linker.isHeld(0) ? 1 : 0)+(linker.isHeld(1) ? 2 : 0);
     // That of nothing around.
     Watch watch = {4*linker.type+held, 2*cells.getNumPieces()};
-    if (isFree(linker)) {
+    if (system.isFree(linker)) {
         watch.where = static_cast<int>(linker.number);
         return watch;
     }

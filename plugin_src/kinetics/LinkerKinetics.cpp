@@ -86,13 +86,14 @@ bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& 
     vector<char> isCut(contours.getNumChains(), 0);
     for (const ChainCut& cut : cuts)
         isCut[cut.chain] = 1;
-    vector<HandPlace> held;
-    for (Linker& linker : state.linkers)
+    if (anyDiffuses)
+        state.positions.resize(3*state.linkers.size(), NO_POSITION);
+    for (size_t i = 0; i < state.linkers.size(); i++) {
+        Linker& linker = state.linkers[i];
+        const HandPlace held[] = {linker.hands[0], linker.hands[1]};
         for (int side = 0; side < 2; side++) {
             HandPlace& place = linker.hands[side];
-            const HandPlace old = place;
-            if (anyDiffuses)
-                held.push_back(old);
+            const HandPlace& old = held[side];
             if (!old.isBound() || contours.isClosed(old.chain))
                 continue;
             const HandAtEnd& atEnd = system.hands[system.types[linker.type].hands[side]].atEnd;
@@ -109,10 +110,10 @@ bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& 
                 stayOnChain(linker, side, count);
             any = any || place.chain != old.chain || place.position != old.position;
         }
+        releaseFromEnd(state, i, held, before, step);
+    }
     for (size_t type = 0; type < system.types.size(); type++)
         state.events[type].unbindings += count.events[type].unbindings;
-    if (anyDiffuses)
-        releaseFromEnds(state, held, before, step);
     return any;
 }
 
@@ -207,20 +208,18 @@ void LinkerKinetics::apply(LinkerState& state, const KineticStep& step, Pending&
     Linker& linker = state.linkers[next.index];
     const int side = next.event.side;
     double* const position = system.types[linker.type].diffuses() ? &state.positions[3*next.index] : nullptr;
-    const bool wasFree = position != nullptr && isFree(linker), lastHand = position != nullptr && !linker.pulls();
+    const bool wasFree = system.isFree(linker), lastHand = position != nullptr && !linker.pulls();
+    const HandPlace before = linker.hands[side];
     HandPlace place;
-    double center[3];
     switch (next.event.kind) {
     case Event::Unbind:
         if (!lastHand || findRelease(linker, side, step, next.random, position))
             unbind(linker, side, sites, count);
         break;
     case Event::Hop:
-        if (lastHand)
-            locate(placeOf(linker, side), step.positions, step.boxes.segments, center);
         hop(linker, side, next.event.direction, sites, count);
-        if (lastHand && isFree(linker))
-            release(state, next.index, side, center, step, next.random);
+        if (system.isFree(linker))
+            release(state, next.index, side, before, contours, step, next.random);
         break;
     case Event::Capture:
         if (captureAnywhere(linker, side, next.random, sites, place))
@@ -232,7 +231,7 @@ void LinkerKinetics::apply(LinkerState& state, const KineticStep& step, Pending&
             bind(linker, side, place, sites, count);
         break;
     }
-    if (position != nullptr && !isFree(linker))
+    if (position != nullptr && !system.isFree(linker))
         fill(position, position+3, NO_POSITION);
 }
 

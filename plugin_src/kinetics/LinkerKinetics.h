@@ -123,8 +123,8 @@ private:
         double perPiece = 0;
         /** Of a hand that walks without a load, towards the plus end, if the linker holds nothing else. */
         double velocity = 0;
-        /** Of linkers that are not bound and have positions. */
-        double diffusion = 0;
+        /** Of linkers that are not bound and have positions: the width of the distribution of a move. */
+        double width = 0;
         /** If not zero, they are taken to have so many pieces around them, wherever they are. */
         unsigned most = 0;
         bool isFree = false, isPlanar = false;
@@ -167,17 +167,16 @@ private:
         const unsigned most = kinds[4*type].most;
         return most > 0 ? most : cells.getMostAround(position);
     }
-    bool isFree(const Linker& linker) const;
     void diffuse(LinkerState& state, const KineticStep& step, int first, int last) const;
     bool proposeToFree(const Linker& linker, const double* position, int side, const KineticStep& step,
             RandomNumbers& random, const Sites* sites, HandPlace& found) const;
     bool findRelease(const Linker& linker, int side, const KineticStep& step, RandomNumbers& random,
             double* position) const;
-    void release(LinkerState& state, std::size_t index, int side, const double* center, const KineticStep& step,
-            RandomNumbers& random) const;
-    void walkOne(LinkerState& state, std::size_t index, const KineticStep& step, Count& count);
-    void releaseFromEnds(LinkerState& state, const std::vector<HandPlace>& held, const Contours& before,
+    void release(LinkerState& state, std::size_t index, int side, const HandPlace& before, const Contours& contours,
+            const KineticStep& step, RandomNumbers& random) const;
+    void releaseFromEnd(LinkerState& state, std::size_t index, const HandPlace* held, const Contours& before,
             const KineticStep& step) const;
+    void walkOne(LinkerState& state, std::size_t index, const KineticStep& step, Count& count);
     bool toProposed(int number, const SegmentPiece& piece, double where, const Sites* sites, HandPlace& found) const;
     void addLink(const Linker& linker, std::vector<Link>& links) const;
     int countAround(const Watch& watch, const KineticStep& step) const;
@@ -188,6 +187,7 @@ private:
     void takeTogether(LinkerState& state, const KineticStep& step, Count& count);
     const SegmentCells::Around& lookAround(const Linker& linker, int side, const KineticStep& step,
             SegmentCells::Around& ofAnchor) const;
+    void vectorTo(const HandPlace& place, const double* from, const KineticStep& step, double* vector) const;
     bool proposePlace(const Linker& linker, int side, const KineticStep& step, RandomNumbers& random,
             const Sites* sites, HandPlace& found) const;
     bool captureAnywhere(const Linker& linker, int side, RandomNumbers& random, const Sites* sites,

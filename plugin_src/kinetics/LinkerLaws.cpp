@@ -266,6 +266,16 @@ bool LinkerKinetics::toProposed(int number, const SegmentPiece& piece, double wh
     return !hand.atEnd.bindsThere || toEnd(hand, found);
 }
 
+/** Find the vector from a point to a place, or to its nearest image. */
+void LinkerKinetics::vectorTo(const HandPlace& place, const double* from, const KineticStep& step,
+        double* vector) const {
+    locate(contours.findPlace(place.chain, place.position), step.positions, step.boxes.segments, vector);
+    for (int k = 0; k < 3; k++)
+        vector[k] -= from[k];
+    if (step.boxes.distances != nullptr)
+        takeToNearestImage(vector, step.boxes.distances);
+}
+
 /** Propose a place where a hand could bind; true if it binds there. */
 bool LinkerKinetics::proposePlace(const Linker& linker, int side, const KineticStep& step, RandomNumbers& random,
         const Sites* sites, HandPlace& found) const {
@@ -283,11 +293,7 @@ bool LinkerKinetics::proposePlace(const Linker& linker, int side, const KineticS
         return false;
     double from[3], vector[3];
     locate(placeOf(linker, 1-side), step.positions, step.boxes.segments, from);
-    locate(contours.findPlace(found.chain, found.position), step.positions, step.boxes.segments, vector);
-    for (int k = 0; k < 3; k++)
-        vector[k] -= from[k];
-    if (step.boxes.distances != nullptr)
-        takeToNearestImage(vector, step.boxes.distances);
+    vectorTo(found, from, step, vector);
     const double distance = sqrt(dot(vector, vector));
     return distance <= hand.reach &&
             accepted < exp(-(1-hand.strainShare)*reduced(energyOf(type, distance)));

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 
 using namespace cylchain;
 using namespace std;
@@ -28,7 +27,7 @@ bool LinkerRegion::isBeyond(const double* center, double radius) const {
 bool LinkerRegion::draw(RandomNumbers& random, bool planar, double* position) const {
     // The box around a closed wall, or else a cell of the periodic box around the middle of a wall.
     double origin[3] = {0, 0, 0}, edges[9] = {}, lower[3], upper[3];
-    if (findBounds(lower, upper))
+    if (findBounds(walls, lower, upper))
         for (int k = 0; k < 3; k++) {
             origin[k] = lower[k];
             edges[4*k] = upper[k]-lower[k];
@@ -78,13 +77,13 @@ bool cylchain::placeFreeLinkers(LinkerState& state, const LinkerSystem& system, 
         return true;
     }
     const NoiseKey key = {seed, LEVEL_OF_FIRST_POSITIONS, state.steps};
-    state.positions.resize(3*state.linkers.size(), numeric_limits<double>::quiet_NaN());
+    state.positions.resize(3*state.linkers.size(), NO_POSITION);
     for (size_t i = 0; i < state.linkers.size(); i++) {
         const Linker& linker = state.linkers[i];
         const LinkerType& type = system.types[linker.type];
         double* const position = &state.positions[3*i];
-        if (!type.diffuses() || linker.isHeld(0) || linker.isHeld(1)) {
-            fill(position, position+3, numeric_limits<double>::quiet_NaN());
+        if (!system.isFree(linker)) {
+            fill(position, position+3, NO_POSITION);
             continue;
         }
         if (!isnan(position[0]))

@@ -205,6 +205,10 @@ struct LinkerSystem {
                 return true;
         return false;
     }
+    /** Whether a linker is of those that diffuse, and holds nothing. */
+    bool isFree(const Linker& linker) const {
+        return types[linker.type].diffuses() && !linker.isHeld(0) && !linker.isHeld(1);
+    }
 };
 
 } // namespace cylchain

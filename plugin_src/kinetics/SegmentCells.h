@@ -84,9 +84,7 @@ public:
     }
     /** At least how many pieces are around a point, and mostly as many: marks have sums over cells. */
     unsigned getMostAround(const double* point) const {
-        int coordinates[3];
-        findCoordinates(point, coordinates);
-        return counts[markOf(coordinates)&lastCount];
+        return counts[findMark(point)&lastCount];
     }
     /** The largest number of getMostAround(). */
     unsigned getMostOfAll() const {

@@ -1,7 +1,7 @@
 #include "openmm/internal/CylinderChainBindingForceImpl.h"
 #include "couplings/Contours.h"
 #include "couplings/EndLinks.h"
-#include "kinetics/LinkerRegion.h"
+#include "couplings/Walls.h"
 #include "openmm/CylinderChainException.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/CylinderChainIntegrator.h"
@@ -136,14 +136,14 @@ void CylinderChainBindingForceImpl::checkDiffusion() const {
     }
 }
 
-vector<cylchain::Wall> CylinderChainBindingForceImpl::findWalls() const {
-    vector<cylchain::Wall> walls;
+void CylinderChainBindingForceImpl::updateWalls() {
+    system.walls.clear();
     for (const ForceImpl* impl : context->getForceImpls()) {
         const CylinderChainWallForceImpl* wall = dynamic_cast<const CylinderChainWallForceImpl*>(impl);
         if (wall != NULL)
-            walls.push_back(wall->getWall());
+            system.walls.push_back(wall->getWall());
     }
-    return walls;
+    linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().setWalls(system.walls);
 }
 
 void CylinderChainBindingForceImpl::placeUnbound(cylchain::LinkerState& changed) {
@@ -151,25 +151,20 @@ void CylinderChainBindingForceImpl::placeUnbound(cylchain::LinkerState& changed)
         changed.positions.clear();
         return;
     }
-    const vector<cylchain::Wall> walls = findWalls();
-    Vec3 box[3];
-    context->getPeriodicBoxVectors(box[0], box[1], box[2]);
-    const double* const periodicBox = owner.usesPeriodicBoundaryConditions() ? &box[0][0] : NULL;
+    updateWalls();
     for (const cylchain::LinkerType& type : system.types)
-        require(!type.diffuses() || cylchain::LinkerRegion(type.walls.empty() ? walls : type.walls,
-                periodicBox).isBounded(), "Linkers that diffuse need a region: add a CylinderChainWallForce that is "
-                "closed (a sphere, a box or an ellipsoid), or have a periodic box, with nothing but slabs and "
-                "cylinders in it");
+        require(!type.diffuses() ||
+                cylchain::isBounded(system.wallsOf(type), owner.usesPeriodicBoundaryConditions()),
+                "Linkers that diffuse need a region: add a CylinderChainWallForce that is closed (a sphere, a capsule, "
+                "a box or an ellipsoid), or a cylinder with a slab across it, or have a periodic box, with nothing but "
+                "slabs and cylinders in it");
     for (size_t i = 0; 3*i < changed.positions.size(); i++) {
         const cylchain::LinkerType& type = system.types[changed.linkers[i].type];
         const double* position = &changed.positions[3*i];
-        require(std::isnan(position[0]) || cylchain::LinkerRegion(type.walls.empty() ? walls : type.walls,
-                periodicBox).encloses(position), "Linker "+to_string(changed.linkers[i].number)+
-                " is outside of the walls");
+        require(std::isnan(position[0]) || cylchain::encloses(system.wallsOf(type), position),
+                "Linker "+to_string(changed.linkers[i].number)+" is outside of the walls");
     }
-    UpdateCylinderChainLinkersKernel& kernel = linkerKernel.getAs<UpdateCylinderChainLinkersKernel>();
-    kernel.setWalls(walls);
-    require(kernel.placeFree(*context, changed, seed, number),
+    require(linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().placeFree(*context, changed, seed, number),
             "There is no room for linkers that diffuse within all walls");
 }
 
@@ -236,7 +231,7 @@ void CylinderChainBindingForceImpl::updateContextState(ContextImpl& context, boo
         return;
     checkReaches(context);
     if (system.anyDiffuses())
-        linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().setWalls(findWalls());
+        updateWalls();
     require(state.nextNumber <= LAST_NUMBER, "Two thousand million linkers have come out of their concentrations, and "
             "there are no more numbers for others. Give them new ones, from zero on: read them by "
             "getLinkersInContext(), and set them by setLinkersInContext()");

@@ -2,7 +2,6 @@
 #include "openmm/OpenMMException.h"
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <set>
 #include <string>
 #include <tuple>
@@ -72,7 +71,7 @@ void FreeColumns::give(LinkerState& state) const {
     checkLinkerColumn("coordinates of unbound linkers", places.size(), 3*numbers.size());
     if (numbers.empty())
         return;
-    state.positions.resize(3*state.linkers.size(), numeric_limits<double>::quiet_NaN());
+    state.positions.resize(3*state.linkers.size(), NO_POSITION);
     size_t i = 0;
     for (size_t k = 0; k < numbers.size(); k++) {
         if (k > 0 && numbers[k] <= numbers[k-1])

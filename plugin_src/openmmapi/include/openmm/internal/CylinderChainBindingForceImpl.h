@@ -75,9 +75,9 @@ private:
     bool removeBrokenBranches();
     void checkDiffusion() const;
     /**
-     * Get the walls of the System, as they are in the Context now.
+     * Have linkers within the walls of the System, as they are in the Context now.
      */
-    std::vector<cylchain::Wall> findWalls() const;
+    void updateWalls();
     /**
      * Find positions for linkers that diffuse, and check those that they have.
      */
