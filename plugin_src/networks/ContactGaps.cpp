@@ -285,8 +285,11 @@ void ContactGaps::selectNear(int firstNew) {
         for (size_t k = 0; k < looks.pairs.size(); k++) {
             const ContactPair& pair = *looks.pairs[k];
             const PairOutlook& outlook = looks.outlooks[k];
-            double room;
-            if (mayClose(looks.numbers[k], pair.before-outlook.radii, outlook.gap, room) ||
+            double before = pair.before-outlook.radii, room;
+            // The surface of what overlaps is as deep as it does: that must be exact, as the end is.
+            if (before < 0)
+                before = sqrt(findNearestPoints(search->getSegments(pair, false)).squared)-outlook.radii;
+            if (mayClose(looks.numbers[k], before, outlook.gap, room) ||
                     (outlook.mayCross && search->crosses(pair)))
                 own.push_back(looks.numbers[k]);
             else
