@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import warnings
 from typing import Any
@@ -69,17 +70,17 @@ def contact_spacing(filament_type: ChainType, diameter: Scalar, temperature: Sca
 def capsule_contact_force(
     filaments: FilamentCollection,
     system: openmm.System,
-    diameter: Numbers,
+    diameter: Numbers | None = None,
     stiffness: Scalar | None = None,
     particles: Indices = (),
     particle_diameter: Numbers | None = None,
     excluded_neighbors: int | None = None,
     periodic: bool | None = None,
 ) -> Any:
-    """A repulsion between segments of filaments, and between segments and other particles.
+    """A repulsion between segments of filaments, and other particles as spheres: of all of them with each other.
 
     Segments are capsules: all points within half the diameter of the line between their ends. Where two of them
-    overlap, the energy is ``(k/2) g^2`` for the gap g, the distance of the lines less the mean of the diameters. Unlike
+    overlap, or two spheres, or a capsule and a sphere, the energy is ``(k/2) g^2`` for the gap g, the distance of the lines less the mean of the diameters. Unlike
     the beads of ``contact_force``, capsules have no gaps and are smooth along the filament, two that cross cost
     ``(k/2) d^2`` at whatever place and angle, and the force takes a fraction of the time.
 
@@ -101,12 +102,15 @@ def capsule_contact_force(
     system : openmm.System
         With all of its particles. The force is not added to it.
     diameter : length, or (filaments,) array of lengths
-        Distance of two axes at which filaments touch: that of the cylinders, or more.
+        Distance of two axes at which filaments touch: that of the cylinders, or more. Nothing where there are only
+        bodies.
     stiffness : energy/length^2, optional
-        k; that of ``default_capsule_stiffness`` for the thinnest filament if not given: crossing costs 40 k_B T.
-        ``setStiffness`` and ``updateParametersInContext`` change it.
+        k; that of ``default_capsule_stiffness`` for the thinnest filament if not given: crossing costs 40 k_B T. That
+        of the smallest sphere where there are no filaments. ``setStiffness`` and ``updateParametersInContext`` change
+        it.
     particles : sequence of int
-        Particles outside filaments that take part, as spheres.
+        Particles outside filaments that take part, as spheres, those of rigid bodies among them. All push each other,
+        but not those of one body, which are excluded: give no force of your own to the same pairs.
     particle_diameter : length, or array of lengths, one for each of ``particles``
     excluded_neighbors : int, optional
         Segments of one filament whose numbers differ by no more than this do not touch each other. If not given: those
@@ -125,39 +129,42 @@ def capsule_contact_force(
     ------
     InputError
         If the compiled engine is missing, a particle does not exist or is one of the filaments', a diameter or
-        stiffness is not positive, the box is narrower than twice a segment with its diameter, or a filament of beam
-        elements has no beads. Implicit schemes need a box as wide as twice a segment with two diameters: a Context with
+        stiffness is not positive, nothing could touch, the box is narrower than twice a segment with its diameter, or
+        a filament of beam elements has no beads. Implicit schemes need a box as wide as twice a segment with two diameters: a Context with
         a narrower one is refused.
 
     Warns
     -----
     ContactWarning
-        If filaments can pass through each other: if ``(k/2) d^2`` is below 25 k_B T for the thinnest. If planar
-        filaments were added across each other: nothing in their plane takes them apart.
+        If filaments, or spheres, can pass through each other: if ``(k/2) d^2`` is below 25 k_B T for the thinnest. If
+        planar filaments were added across each other: nothing in their plane takes them apart.
     """
     choose_engine("compiled")
     from .. import plugin
 
     require_filaments(filaments)
-    diameters = filament_diameters(diameter, len(filaments))
+    if diameter is None and len(filaments):
+        raise InputError("Filaments need a diameter at which they touch.")
+    diameters = np.zeros(0) if diameter is None else filament_diameters(diameter, len(filaments))
     spheres = outside_particles(filaments, system, particles)
     sphere_diameters = particle_diameters(particles, particle_diameter)
     for own in (*diameters, *sphere_diameters):
         _refuse_size(own)
-    if not len(diameters):
-        raise InputError("There are no filaments that could touch.")
+    if not len(diameters) and len(spheres) < 2:
+        raise InputError("There are no filaments that could touch, and no two spheres.")
     _require_beads(filaments, diameters)
     if stiffness is None:
         if filaments.temperature == 0.0:
             raise InputError("At a temperature of zero, a contact needs a stiffness.")
-        stiffness = default_capsule_stiffness(diameters.min(), filaments.temperature)
+        thinnest = diameters if len(diameters) else sphere_diameters
+        stiffness = default_capsule_stiffness(thinnest.min(), filaments.temperature)
     stiffness = positive(stiffness, STIFFNESS, "stiffness")
     if excluded_neighbors is not None:
         excluded_neighbors = whole_number(excluded_neighbors, 0, "excluded_neighbors", LARGEST_INT)
     periodic = is_periodic(system) if periodic is None else true_or_false(periodic, "periodic")
     if periodic:
         _check_box(system, filaments, max([*diameters, *sphere_diameters]))
-    _warn_of_barrier(filaments, diameters, stiffness)
+    _warn_of_barrier(filaments, diameters, sphere_diameters, stiffness)
     _warn_of_planar_crossing(filaments, default_box(system) if periodic else None)
     force = plugin.CylinderChainContactForce(stiffness)
     force.setUsesPeriodicBoundaryConditions(periodic)
@@ -169,6 +176,7 @@ def capsule_contact_force(
         force.addChain([int(end) for end in ends], float(value), neighbors, filament.closed)
     for particle, value in zip(spheres, sphere_diameters):
         force.addSphere(int(particle), float(value))
+    _exclude_within_bodies(force, filaments, spheres)
     return force
 
 
@@ -181,6 +189,17 @@ def as_capsule_contact_force(force: openmm.Force) -> Any | None:
     if not plugin.CylinderChainContactForce.isinstance(force):
         return None
     return plugin.CylinderChainContactForce.cast(force)
+
+
+def _exclude_within_bodies(force, filaments, spheres):
+    owners = {int(particle): body for body, own in enumerate(filaments.body_indices) for particle in own}
+    of_bodies = {}
+    for number, particle in enumerate(spheres):
+        if int(particle) in owners:
+            of_bodies.setdefault(owners[int(particle)], []).append(number)
+    for own in of_bodies.values():
+        for one, other in itertools.combinations(own, 2):
+            force.addExclusion(-1, one, -1, other)
 
 
 def _require_beads(filaments, diameters):
@@ -218,25 +237,31 @@ def _check_box(system, filaments, diameter):
     a, b, c = default_box(system)
     volume = abs(np.dot(a, np.cross(b, c)))
     narrowest = min(volume / np.linalg.norm(np.cross(*pair)) for pair in ((b, c), (c, a), (a, b)))
-    longest = max(_longest_capsule(*each) for each in zip(filaments, _ends_of_capsules(filaments)))
+    lengths = [_longest_capsule(*each) for each in zip(filaments, _ends_of_capsules(filaments))]
+    longest = max(lengths, default=0.0)
     needed = 2.0 * (longest + diameter)
     if narrowest < needed:
+        between = f" between segments of {longest:g} nm" if lengths else ""
         raise InputError(
-            f"The periodic box is {narrowest:g} nm wide between two of its faces: contacts of {diameter:g} nm between "
-            f"segments of {longest:g} nm need {needed:g} nm. Take a larger box or shorter segments."
+            f"The periodic box is {narrowest:g} nm wide between two of its faces: contacts of {diameter:g} nm{between} "
+            f"need {needed:g} nm. Take a larger box{' or shorter segments' if lengths else ''}."
         )
 
 
-def _warn_of_barrier(filaments, diameters, stiffness):
-    number = int(np.argmin(diameters))
-    barrier, kT = 0.5 * stiffness * diameters[number] ** 2, thermal_energy(filaments.temperature)
-    if barrier < SAFE_BARRIER * kT:
-        warnings.warn(
-            f"Filament {number} has a contact diameter of {diameters[number]:.3g} nm: others of its kind can pass "
-            f"through it for {barrier / kT:.3g} k_B T. Use a larger stiffness.",
-            ContactWarning,
-            stacklevel=3,
-        )
+def _warn_of_barrier(filaments, diameters, sphere_diameters, stiffness):
+    kT = thermal_energy(filaments.temperature)
+    for what, own in (("Filament", diameters), ("Sphere", sphere_diameters if len(sphere_diameters) > 1 else ())):
+        if not len(own):
+            continue
+        number = int(np.argmin(own))
+        barrier = 0.5 * stiffness * own[number] ** 2
+        if barrier < SAFE_BARRIER * kT:
+            warnings.warn(
+                f"{what} {number} has a contact diameter of {own[number]:.3g} nm: others of its kind can pass "
+                f"through it for {barrier / kT:.3g} k_B T. Use a larger stiffness.",
+                ContactWarning,
+                stacklevel=3,
+            )
 
 
 def _warn_of_planar_crossing(filaments, box):

@@ -131,7 +131,7 @@ class CompiledEngine(Engine):
             settings.step_size,
             settings.scheme,
             settings.random_seed,
-            len(placed.filaments),
+            len(placed.filaments) + len(placed.bodies),
             settings.flow,
             advice_after_blow_up(system),
             settings.checks,
@@ -286,7 +286,7 @@ class NativeIntegrator(CylinderChainIntegrator):
     random_seed : int
         0 draws a fresh seed for each Context.
     filaments : int
-        How many there are.
+        How many there are, and bodies.
     flow : Flow, optional
         Of the solvent; at rest if not given.
     advice : str

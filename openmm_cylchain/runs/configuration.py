@@ -127,7 +127,7 @@ class Configuration:
 
     @property
     def relaxes(self):
-        """Whether filaments that overlap come apart before a run begins."""
+        """Whether what overlaps comes apart before a run begins."""
         return self.contacts is not None and self.contacts.relax
 
 
@@ -287,7 +287,7 @@ def _read_tables(raw):
 def _refuse_without_filaments(tables):
     # What names a filament is refused by its number.
     random = [entries for entries in tables["link"] if "within" in entries]
-    for entries in (*tables["contacts"], *tables["linkers"], *random):
+    for entries in (*tables["linkers"], *random):
         raise entries.error("is about filaments, but there is no [[filament]] table: leave it out, or add one.")
 
 
@@ -306,6 +306,8 @@ def _filaments(tables, solvent, box, folder, monomers):
         groups.append(read_nucleation(entries, groups, solvent, box, monomers))
         _check_nodes(entries, groups)
     (contacts,) = tables["contacts"] or (None,)
+    if contacts is not None and groups:
+        contacts.require("diameter")
     for entries in tables["branching"]:
         groups.append(read_branching(entries, groups, solvent, monomers, contacts))
         _check_nodes(entries, groups)

@@ -77,7 +77,7 @@ def build_system(configuration, engine, seed, kinetics=True, begun=None):
     count = add_links(configuration, filaments, system, seed)
     add_joints(configuration, filaments, system)
     tables = configuration.tables
-    if configuration.contacts is not None and len(present):
+    if configuration.contacts is not None and (len(present) or len(spheres) + len(touching) > 1):
         own = configuration.contacts
         with tables["contacts"][0].naming():
             force = capsule_contact_force(

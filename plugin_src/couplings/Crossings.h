@@ -287,7 +287,8 @@ inline bool findPassage(const SegmentPair& start, const SegmentPair& end, double
     passage.normal = start.between(first.s, first.t)*(1/std::sqrt(first.squared));
     passage.distance = end.between(passage.s, passage.t).dot(passage.normal);
     passage.through = passage.distance < 0;
-    return true;
+    // Two spheres have no axis: as long as the one stays on its side of the other, their distance is what counts.
+    return passage.through || start.p.squared() > 0 || start.q.squared() > 0;
 }
 
 /** By how much a point of one segment moves against one of the other, at most. */

@@ -118,14 +118,14 @@ BODY = TableKind(
             "contacts",
             Flag("false"),
             None,
-            "Whether filaments that touch their spheres are pushed away, with [contacts]; true if not given, but false "
-            "for bodies that hold filaments.",
+            "Whether their spheres push filaments, particles and other bodies that touch them, with [contacts]; true if "
+            "not given, but false for bodies that hold filaments.",
         ),
         Key("filaments", Inline(_HELD, _HELD_EXAMPLE), None, "Filaments that begin on them: see below."),
     ),
     "Rigid bodies: beads, vesicles, nuclei, spindle poles, asters, see `Body`. [[link]] and the anchors of [[linkers]] "
-    "take hold of their points. [contacts] and [[wall]] act on their spheres, which do not push each other. They need "
-    "the compiled engine and the scheme implicit.",
+    "take hold of their points. [contacts] and [[wall]] act on their spheres. They need the compiled engine and the "
+    "scheme implicit.",
     repeated=True,
 )
 

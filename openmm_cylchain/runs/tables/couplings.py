@@ -27,24 +27,30 @@ from .shapes import SHAPE_KEYS, read_shape
 CONTACTS = TableKind(
     "contacts",
     (
-        Key("diameter", Quantity(units.LENGTH), REQUIRED, "Distance of two axes at which filaments touch."),
+        Key(
+            "diameter",
+            Quantity(units.LENGTH),
+            None,
+            "Distance of two axes at which filaments touch; needed where there are some.",
+        ),
         Key(
             "stiffness",
             Quantity(units.STIFFNESS),
             None,
-            "Stiffness of a contact; without it, two filaments cross for 40 k_B T.",
+            "Stiffness of a contact; without it, two filaments cross for 40 k_B T, or without filaments the two smallest "
+            "spheres.",
         ),
         Key("excluded_neighbors", Whole(0, 10**6, "2"), None, "Segments of one filament that do not touch each other."),
         Key(
             "relax",
             Flag("false"),
             True,
-            "Whether filaments that are drawn on top of each other come apart before the run.",
+            "Whether filaments, particles and bodies that are drawn on top of each other come apart before the run.",
         ),
         ACTIVE,
     ),
     "Filaments do not pass through each other: their segments are capsules, see `capsule_contact_force`. [[particles]] "
-    "and [[body]] with a diameter take part as spheres.",
+    "and [[body]] take part as spheres, which push each other, too, but not those of one body.",
 )
 
 WALL = TableKind(
@@ -171,7 +177,7 @@ LINK = TableKind(
 class Contacts:
     """The [contacts] table; lengths in nm."""
 
-    diameter: float
+    diameter: float | None
     stiffness: float | None
     excluded_neighbors: int | None
     relax: bool
@@ -236,8 +242,8 @@ class LinkGroup:
 
 def read_contacts(entries, groups):
     """The Contacts of a [contacts] table, for FilamentGroups."""
-    thinnest = min(group.type.diameter for group in groups)
-    if entries["diameter"] < _LEAST_DIAMETER * thinnest:
+    thinnest = min((group.type.diameter for group in groups), default=0.0)
+    if groups and entries["diameter"] < _LEAST_DIAMETER * thinnest:
         raise entries.at("diameter").error(
             f"is {entries['diameter']:g} nm, but filaments are {thinnest:g} nm thick: they touch at their diameter, or "
             "further apart."

@@ -31,8 +31,8 @@ PARTICLES = TableKind(
         Key("diffusion", Quantity(units.DIFFUSION), None, "In place of friction: k_B T over the friction."),
         Key("fixed", Flag(), False, "They do not move."),
     ),
-    "Spheres that diffuse, beside filaments. Filaments push them where there are [contacts], walls keep them in; they "
-    "do not push each other.",
+    "Spheres that diffuse, beside filaments. Where there are [contacts], they push filaments, bodies and each other; "
+    "walls keep them in.",
     repeated=True,
 )
 
