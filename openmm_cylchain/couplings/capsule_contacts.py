@@ -80,9 +80,10 @@ def capsule_contact_force(
     """A repulsion between segments of filaments, and other particles as spheres: of all of them with each other.
 
     Segments are capsules: all points within half the diameter of the line between their ends. Where two of them
-    overlap, or two spheres, or a capsule and a sphere, the energy is ``(k/2) g^2`` for the gap g, the distance of the lines less the mean of the diameters. Unlike
-    the beads of ``contact_force``, capsules have no gaps and are smooth along the filament, two that cross cost
-    ``(k/2) d^2`` at whatever place and angle, and the force takes a fraction of the time.
+    overlap, or two spheres, or a capsule and a sphere, the energy is ``(k/2) g^2`` for the gap g, the distance of the
+    lines less the mean of the diameters. Unlike the beads of ``contact_force``, capsules have no gaps and are smooth
+    along the filament, two that cross cost ``(k/2) d^2`` at whatever place and angle, and the force takes a fraction
+    of the time.
 
     Two segments touch where they are nearest to each other, and if they are nearly parallel (within 1.8 degrees), at
     both ends of their overlap with k/2 each. What neighbouring segments see of one thing counts once, so that nothing
@@ -130,8 +131,8 @@ def capsule_contact_force(
     InputError
         If the compiled engine is missing, a particle does not exist or is one of the filaments', a diameter or
         stiffness is not positive, nothing could touch, the box is narrower than twice a segment with its diameter, or
-        a filament of beam elements has no beads. Implicit schemes need a box as wide as twice a segment with two diameters: a Context with
-        a narrower one is refused.
+        a filament of beam elements has no beads. Implicit schemes need a box as wide as twice a segment with two
+        diameters: a Context with a narrower one is refused.
 
     Warns
     -----

@@ -78,13 +78,13 @@ def warn_of_hard_contacts(
         label = f"{force.getName()} (force {index}): a time step of {format_time(step, 4)}"
         if step > longest:
             warnings.warn(
-                f"{label} takes contacts, and walls beside them, for hard ones: filaments keep their distances, but "
+                f"{label} takes contacts, and walls beside them, for hard ones: what touches keeps its distance, but "
                 "energies and forces of contacts and walls are too small, by up to a half. Steps of up to "
                 f"{format_time(longest, 3)} resolve them.",
                 ContactWarning,
                 stacklevel=4,
             )
-        elif step > SHARE_FOR_BUNDLES * longest:
+        elif contacts.getNumChains() and step > SHARE_FOR_BUNDLES * longest:
             warnings.warn(
                 f"{label} gives contacts of filaments that lie along each other, as in a bundle, up to a sixth too "
                 f"much energy: 6 % at {format_time(SHARE_FOR_BUNDLES * longest, 3)}, nothing at a tenth of "

@@ -118,8 +118,8 @@ BODY = TableKind(
             "contacts",
             Flag("false"),
             None,
-            "Whether their spheres push filaments, particles and other bodies that touch them, with [contacts]; true if "
-            "not given, but false for bodies that hold filaments.",
+            "Whether their spheres push filaments, particles and other bodies that touch them, with [contacts]; true "
+            "if not given, but false for bodies that hold filaments.",
         ),
         Key("filaments", Inline(_HELD, _HELD_EXAMPLE), None, "Filaments that begin on them: see below."),
     ),

@@ -37,8 +37,8 @@ CONTACTS = TableKind(
             "stiffness",
             Quantity(units.STIFFNESS),
             None,
-            "Stiffness of a contact; without it, two filaments cross for 40 k_B T, or without filaments the two smallest "
-            "spheres.",
+            "Stiffness of a contact; without it, two filaments cross for 40 k_B T, or without filaments the two "
+            "smallest spheres.",
         ),
         Key("excluded_neighbors", Whole(0, 10**6, "2"), None, "Segments of one filament that do not touch each other."),
         Key(
