@@ -34,7 +34,8 @@ class MadeBodies:
     """Bodies of one table: their name and that of their property, how many, the table and its number, and points of
     keys by their names.
 
-    ``singles`` are numbers of points by the names of singles: one for each anchor.
+    ``singles`` are numbers of points by the names of singles: one for each anchor. ``steric`` is the line that lets
+    them touch others, if any does.
     """
 
     name: str
@@ -44,6 +45,7 @@ class MadeBodies:
     number: int
     groups: dict
     singles: dict = field(default_factory=dict)
+    steric: int | None = None
 
 
 class _Shape:
@@ -274,27 +276,26 @@ def _add_table(translation, own, new, count, shape):
     _add_places(translation, table, new, count)
     if translation.dimensions == 2:
         table.add("planar", True, Note(EXACT, "two dimensions"))
-    _note_surroundings(translation, table, settings)
+    steric = _steric_line(translation, table, settings)
     if settings.number("viscosity", default=translation.viscosity) != translation.viscosity:
         text = f"viscosity = {settings.text('viscosity')}, its own"
         table.comment(Note(LEFT_OUT, text, settings.line_of("viscosity"), "bodies with a viscosity of their own"))
     for key in ("point_mobility", "piston_effect"):
         settings.values(key)
     number = len(translation.document.tables_called("[[body]]"))
-    made = MadeBodies(new.name, own.name, count, table, number, shape.groups, shape.singles)
+    made = MadeBodies(new.name, own.name, count, table, number, shape.groups, shape.singles, steric)
     translation.bodies.append(made)
     return made
 
 
-def _note_surroundings(translation, table, settings):
+def _steric_line(translation, table, settings):
     steric = settings.text("steric")
     if translation.script.simul.text("steric") in OFF:
-        return
-    if steric in OFF:
-        table.add("contacts", False, Note(EXACT, "steric is off"))
-    else:
-        text = "contacts of bodies with each other"
-        table.comment(Note(LEFT_OUT, text, settings.line_of("steric"), "contacts between bodies"))
+        return None
+    if steric not in OFF:
+        return settings.line_of("steric")
+    table.add("contacts", False, Note(EXACT, "steric is off"))
+    return None
 
 
 def _add_places(translation, table, new, count):
@@ -432,6 +433,10 @@ def _add_fibers(translation, new, aster, made, outer, inner, draw):
     exact = arm == wanted
     text = "stiffness and radius of the aster" + ("" if exact else ", the second spring nearer where fibers are short")
     made.table.add("filaments", held, Note(EXACT if exact else NEAREST, text, new.line))
+    if made.steric is not None:
+        text = "contacts of bodies that hold fibers"
+        made.table.comment(Note(LEFT_OUT, text, made.steric, text))
+        made.steric = None
 
 
 def _places_of(translation, options, kind, number, outer, inner, draw):

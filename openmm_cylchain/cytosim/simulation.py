@@ -65,7 +65,7 @@ def _steric_radius(settings):
 
 
 def add_contacts(translation):
-    """The [contacts] table, if fibers touch each other."""
+    """The [contacts] table, if fibers or bodies touch each other."""
     simul, diameter = translation.script.simul, translation.contact_diameter
     radii = {fiber.name: _steric_radius(fiber.settings) for fiber in translation.fibers_made()}
     for fiber in translation.fibers_made():
@@ -74,15 +74,20 @@ def add_contacts(translation):
         if diameter and extra > 0.0 and pull > 0.0:
             line = fiber.settings.line_of("steric")
             translation.left_out(f"the attraction of {fiber.name} beyond contact", line, "contacts that attract")
-    if diameter is None or not any(radii.values()):
+    of_bodies = [own.steric for own in translation.bodies if own.steric is not None]
+    of_fibers = diameter is not None and any(radii.values())
+    if radii and not of_fibers and of_bodies:
+        text = "contacts of bodies, beside fibers that do not touch each other"
+        translation.left_out(text, of_bodies[0], "contacts that differ between filaments")
+    if not of_fibers and (radii or not of_bodies):
         return
     table = translation.document.table("[contacts]", simul.line_of("steric"))
-    table.add("diameter", quantity(diameter, "um"), Note(EXACT, "twice the radius of steric"))
+    if of_fibers:
+        table.add("diameter", quantity(diameter, "um"), Note(EXACT, "twice the radius of steric"))
     stiffness = simul.number(("steric", 1), "steric_stiff_push", default=0.0)
     if stiffness > 0.0:
-        table.add(
-            "stiffness", quantity(stiffness, "pN/um"), Note(NEAREST, "of each crossing; Cytosim's is of vertices")
-        )
+        note = Note(NEAREST, "of each crossing; Cytosim's is of vertices") if of_fibers else Note(EXACT, "")
+        table.add("stiffness", quantity(stiffness, "pN/um"), note)
     if len(set(radii.values())) > 1:
         text = f"contacts of filaments that differ: {', '.join(f'{name} {own:g} um' for name, own in radii.items())}"
         table.comment(Note(LEFT_OUT, text, simul.line_of("steric"), "contacts that differ between filaments"))
