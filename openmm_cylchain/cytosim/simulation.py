@@ -76,10 +76,12 @@ def add_contacts(translation):
             translation.left_out(f"the attraction of {fiber.name} beyond contact", line, "contacts that attract")
     of_bodies = [own.steric for own in translation.bodies if own.steric is not None]
     of_fibers = diameter is not None and any(radii.values())
-    if radii and not of_fibers and of_bodies:
+    # In another stage, there may be some.
+    any_fibers = any(own.kind == "fiber" for own in translation.script.properties.values())
+    if any_fibers and not of_fibers and of_bodies:
         text = "contacts of bodies, beside fibers that do not touch each other"
         translation.left_out(text, of_bodies[0], "contacts that differ between filaments")
-    if not of_fibers and (radii or not of_bodies):
+    if not of_fibers and (any_fibers or not of_bodies):
         return
     table = translation.document.table("[contacts]", simul.line_of("steric"))
     if of_fibers:

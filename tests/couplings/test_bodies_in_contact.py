@@ -154,47 +154,49 @@ def test_a_dumbbell_and_a_sphere(microseconds, interval, samples):
     _check_mean(cosines, cosine, 0.25)
 
 
-EDGE, LAYERS, BEADS = 400.0, 40, 12
+LAYERS = 40
 
 
-def _distances_in_layers(places):
+def _distances_in_layers(places, edge):
     """Of the pairs of beads in each layer, (layers, pairs), from places (layers, beads, 2) in the periodic box."""
-    first, second = np.triu_indices(BEADS, 1)
+    first, second = np.triu_indices(places.shape[1], 1)
     between = places[:, first] - places[:, second]
-    return np.linalg.norm(between - EDGE * np.round(between / EDGE), axis=2)
+    return np.linalg.norm(between - edge * np.round(between / edge), axis=2)
 
 
-def _monte_carlo_of_layers(sweeps):
+def _monte_carlo_of_layers(sweeps, edge, beads):
     """Energies (sweeps / 4, layers), and where the beads are in the end."""
     generator = np.random.default_rng(5)
-    grid = np.stack(np.meshgrid(EDGE / 4 * (np.arange(4) + 0.5), EDGE / 3 * (np.arange(3) + 0.5)), axis=-1)
-    places = np.tile(grid.reshape(1, BEADS, 2), (LAYERS, 1, 1))
+    places = generator.uniform(0, edge, size=(LAYERS, beads, 2))
     energies = []
     for sweep in range(sweeps):
-        for bead in range(BEADS):
+        for bead in range(beads):
             moved = places[:, bead] + generator.uniform(-30, 30, size=(LAYERS, 2))
             others = np.delete(places, bead, axis=1)
             energy = []
             for own in (places[:, bead], moved):
                 between = others - own[:, None]
-                between -= EDGE * np.round(between / EDGE)
+                between -= edge * np.round(between / edge)
                 energy.append(_overlap(np.sqrt(np.sum(between**2, axis=2))).sum(axis=1))
             taken = generator.uniform(size=LAYERS) < np.exp(np.minimum(0, energy[0] - energy[1]) / KT)
             places[taken, bead] = moved[taken]
         if sweep >= sweeps // 4 and sweep % 4 == 0:
-            energies.append(_overlap(_distances_in_layers(places)).sum(axis=1))
+            energies.append(_overlap(_distances_in_layers(places, edge)).sum(axis=1))
     return np.array(energies), places
 
 
-@pytest.mark.parametrize("softness, interval, samples", [(1.6, 2, 30), pytest.param(0.16, 10, 60, marks=SLOW)])
-def test_dense_layers_of_planar_beads(softness, interval, samples):
-    """Beads that cover six tenths of a periodic layer, in which each touches several at once."""
-    energies, places = _monte_carlo_of_layers(500 if softness > 1 else 3000)
+@pytest.mark.parametrize(
+    "softness, interval, samples, edge, beads",
+    [(1.6, 2, 30, 400.0, 12), pytest.param(0.16, 10, 120, 260.0, 5, marks=SLOW)],
+)
+def test_dense_layers_of_planar_beads(softness, interval, samples, edge, beads):
+    """Beads that cover six tenths of periodic layers, in which each touches several at once."""
+    energies, places = _monte_carlo_of_layers(600 if softness > 1 else 3000, edge, beads)
     filaments = Filaments(VISCOSITY, TEMPERATURE)
-    for layer, beads in enumerate(places):
-        for x, y in beads:
+    for layer, own in enumerate(places):
+        for x, y in own:
             filaments.add_body(Body.sphere(0.5 * DIAMETER), [x, y, 200.0 * layer], planar=True)
-    _, system, positions = filaments.build(box_vectors=np.diag([EDGE, EDGE, 200.0 * LAYERS]))
+    _, system, positions = filaments.build(box_vectors=np.diag([edge, edge, 200.0 * LAYERS]))
     _touching(filaments, system)
     integrator = filaments.create_integrator(system, _step_of_softness(softness), random_seed=6)
     context = new_context(system, positions, integrator, "CPU", {"Threads": "1"})
@@ -203,8 +205,8 @@ def test_dense_layers_of_planar_beads(softness, interval, samples):
     integrator.step(5 * interval)
     for _ in range(samples):
         integrator.step(interval)
-        now = positions_of(context)[centres].reshape(LAYERS, BEADS, 3)
-        found.append(_overlap(_distances_in_layers(now[:, :, :2])).sum(axis=1))
+        now = positions_of(context)[centres].reshape(LAYERS, beads, 3)
+        found.append(_overlap(_distances_in_layers(now[:, :, :2], edge)).sum(axis=1))
     assert np.all(now[:, :, 2] == 200.0 * np.arange(LAYERS)[:, None])
     of_layers = energies.mean(axis=0)
     _check_mean(found, (of_layers.mean(), of_layers.std() / np.sqrt(LAYERS)), 0.2)

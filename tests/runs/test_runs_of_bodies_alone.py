@@ -58,7 +58,6 @@ def test_a_run_of_bodies_alone(tmp_path):
 @pytest.mark.parametrize(
     "table",
     [
-        '[contacts]\ndiameter = "10 nm"',
         '[[linkers]]\ntype = "ALPHA_ACTININ"\ncount = 5\nvolume = "1 um^3"',
         '[[link]]\nwithin = "30 nm"\nstiffness = "1 pN/nm"',
     ],

@@ -15,10 +15,10 @@ using namespace cylchain;
 using namespace std;
 
 /**
- * In an implicit step, a periodic box must be wider than twice the sum of a segment and so many of its diameters:
- * contacts are looked for beyond the surfaces of segments, and on their way.
+ * In an implicit step, a periodic box must be wider than twice the sum of a segment and so many of its diameters, or so
+ * many of a sphere: contacts are looked for beyond surfaces, and on their way.
  */
-static const double DIAMETERS_OF_BOX = 2;
+static const double DIAMETERS_OF_BOX = 2, DIAMETERS_OF_SPHERE = 1.25;
 
 CylinderChainContactForceImpl::CylinderChainContactForceImpl(const CylinderChainContactForce& owner) :
         PushForceImpl(owner), owner(owner), stiffness(owner.getStiffness()),
@@ -195,10 +195,12 @@ void CylinderChainContactForceImpl::refuseBox(ContextImpl& context, const Cylind
         note(capsules[own.capsule].first, capsules[own.capsule].second, longestElement/own.pieces);
     double size = 0, length = 0, diameter = 0;
     for (const Capsule& capsule : capsules) {
-        const double own = capsule.second < 0 ? 0 : min(lengths[capsule.first], lengths[capsule.second]);
-        if (own+DIAMETERS_OF_BOX*2*capsule.radius <= size)
+        const bool isSphere = capsule.second < 0;
+        const double own = isSphere ? 0 : min(lengths[capsule.first], lengths[capsule.second]);
+        const double needed = own+(isSphere ? DIAMETERS_OF_SPHERE : DIAMETERS_OF_BOX)*2*capsule.radius;
+        if (needed <= size)
             continue;
-        size = own+DIAMETERS_OF_BOX*2*capsule.radius;
+        size = needed;
         length = own;
         diameter = 2*capsule.radius;
     }
@@ -217,7 +219,7 @@ void CylinderChainContactForceImpl::refuseBox(ContextImpl& context, const Cylind
         message << "segments of " << length << " nm with contacts of " << diameter << " nm need twice the sum of their "
                 "length and " << DIAMETERS_OF_BOX << " diameters, ";
     else
-        message << "spheres of " << diameter << " nm need " << 2*DIAMETERS_OF_BOX << " diameters, ";
+        message << "spheres of " << diameter << " nm need " << 2*DIAMETERS_OF_SPHERE << " diameters, ";
     message << needed << " nm. Take a larger box" << (length > 0 ? " or shorter segments" : "");
     throw OpenMMException(message.str());
 }
