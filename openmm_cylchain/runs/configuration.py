@@ -126,6 +126,11 @@ class Configuration:
     stages: tuple = dataclasses.field(default=(), compare=False, repr=False)
 
     @property
+    def contacts_of_filaments(self):
+        """Whether there are contacts that filaments may feel."""
+        return self.contacts is not None and bool(self.filaments)
+
+    @property
     def relaxes(self):
         """Whether what overlaps comes apart before a run begins."""
         return self.contacts is not None and self.contacts.relax

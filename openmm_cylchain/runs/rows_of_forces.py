@@ -15,14 +15,14 @@ class RowsOfForces:
     Attributes
     ----------
     there : (bool, bool)
-        Whether there are walls, and contacts, in some stage.
+        Whether there are walls, and contacts of filaments, in some stage.
     """
 
     def __init__(self, stages, configuration):
         self._walls = [own.number for own in configuration.walls]
         faces = {own.number: len(own.shape.faces) for stage in stages for own in stage.configuration.walls}
         self._faces = [(number, face) for number in sorted(faces) for face in range(faces[number])]
-        self.there = bool(faces), any(stage.configuration.contacts is not None for stage in stages)
+        self.there = bool(faces), any(stage.configuration.contacts_of_filaments for stage in stages)
 
     def of(self, walls, contacts, filaments):
         """Rows of walls, each with its wall and face, and of contacts; see ``ForceTables.write_rows``."""

@@ -53,7 +53,7 @@ def write_figure(configuration, directory, trajectory, network):
 
 
 def _draw(configuration, directory, trajectory, network):
-    has_forces = bool(configuration.walls or configuration.contacts)
+    has_forces = bool(configuration.walls or configuration.contacts_of_filaments)
     grow = [group.growth is not None for group in configuration.filaments]
     # They have a row of their own, unless there is nothing to compare beside them.
     own_row = any(grow) and (network is not None or not all(grow))
@@ -207,13 +207,13 @@ def _draw_forces(axes, configuration, directory, times):
         for number, (wall, face) in enumerate(faces):
             label = _face_label(walls[wall], wall, face)
             axes[0].plot(time, loads[:, number], color=_COLOURS[number % len(_COLOURS)], linewidth=1.2, label=label)
-    if configuration.contacts:
+    if configuration.contacts_of_filaments:
         table = read_reports(directory.contact_forces)
         time, loads = table["time (ms)"][1:, 0] * MILLISECOND / length, table["load (pN)"][1:]
         axes[1].plot(time, loads.mean(axis=1), color=_COLOURS[0], linewidth=1.5, label="mean over filaments")
         axes[1].plot(time, loads.max(axis=1), ":", color=_COLOURS[0], linewidth=1.0, label="largest")
     titles = "Forces of walls, by faces", "Forces of contacts on a filament"
-    for axis, there, title in zip(axes, (configuration.walls, configuration.contacts), titles):
+    for axis, there, title in zip(axes, (configuration.walls, configuration.contacts_of_filaments), titles):
         if not there:
             axis.set_axis_off()
             continue

@@ -201,7 +201,8 @@ class RunReporter:
             if growth_in(simulation.context, filaments) is not None:
                 self._growth = opened(table(files.growth))
             self._readers = ForceReaders(simulation.context)
-            there = bool(self._readers.wall_forces()), bool(self._readers.contact_forces())
+            on_filaments = len(filaments) > 0 and bool(self._readers.contact_forces())
+            there = bool(self._readers.wall_forces()), on_filaments
             sizes = None
             if self._append:
                 paths = files.wall_forces, files.contact_forces

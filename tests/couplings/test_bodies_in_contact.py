@@ -191,7 +191,7 @@ def _monte_carlo_of_layers(sweeps, edge, beads):
 )
 def test_dense_layers_of_planar_beads(softness, interval, samples, edge, beads):
     """Beads that cover six tenths of periodic layers, in which each touches several at once."""
-    energies, places = _monte_carlo_of_layers(600 if softness > 1 else 3000, edge, beads)
+    energies, places = _monte_carlo_of_layers(400 if softness > 1 else 3000, edge, beads)
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     for layer, own in enumerate(places):
         for x, y in own:

@@ -2,6 +2,7 @@
 
 import json
 import math
+import warnings
 
 import gsd.hoomd
 import matplotlib.pyplot as plt
@@ -11,7 +12,7 @@ from openmm import app
 
 from openmm_cylchain import Body, Filaments, RunReporter, analysis, make_whole
 from openmm_cylchain.cli import main
-from openmm_cylchain.errors import InputError, InstabilityError
+from openmm_cylchain.errors import ContactWarning, InputError, InstabilityError
 from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.run import run
 
@@ -89,6 +90,41 @@ def test_what_is_made_of_a_run_of_bodies_alone(tmp_path):
     # In angstroms.
     assert (names == "BALL").sum() == 10
     assert np.all(particles.diameter[names == "BALL"] == 1000.0)
+
+
+CROWD = (
+    BALLS.replace("count = 10", "count = 40")
+    .replace('radius = "1 um"', 'radius = "250 nm"')
+    .replace('radius = "1.5 um"', 'radius = "300 nm"')
+)
+
+
+def _overlaps(positions):
+    centres = positions.reshape(40, -1, 3)[:, 0]
+    first, second = np.triu_indices(40, 1)
+    return np.maximum(100.0 - np.linalg.norm(centres[first] - centres[second], axis=1), 0.0)
+
+
+def test_bodies_on_top_of_each_other_come_apart_before_a_run(tmp_path):
+    """A fifth of a sphere is full of them: contacts of 2 pN/nm leave overlaps of few nm."""
+    apart = parse_configuration(CROWD + '[contacts]\nstiffness = "2 pN/nm"\n')
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ContactWarning)
+        run(apart, tmp_path / "out")
+        run(parse_configuration(CROWD), tmp_path / "without")
+    found, without = (analysis.load(tmp_path / name) for name in ("out", "without"))
+    assert _overlaps(without.positions(0)).max() > 50.0
+    for frame in (0, 10):
+        assert _overlaps(found.positions(frame)).max() < 10.0
+    touching = found.contacts(10)
+    assert np.all(touching.filaments == -1)
+    assert len(touching) == np.count_nonzero(_overlaps(found.positions(10)))
+
+
+def test_contacts_need_a_diameter_where_there_are_filaments():
+    text = CROWD + '[[filament]]\ntype = "F_ACTIN"\nsegments = 3\n[contacts]\nstiffness = "2 pN/nm"\n'
+    with pytest.raises(InputError, match="lacks the key 'diameter'"):
+        parse_configuration(text)
 
 
 def test_a_step_of_bodies_alone_is_checked(tmp_path):
