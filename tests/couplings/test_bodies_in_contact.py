@@ -71,7 +71,7 @@ def test_two_spheres_on_a_spring(softness, interval, samples):
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     for number, distance in enumerate(distances):
         for x in (0.0, distance):
-            filaments.add_body(Body.sphere(0.5 * DIAMETER), [x, 1000.0 * number, 0])
+            filaments.add_body(Body.sphere(0.5 * DIAMETER), [x, 1e4 * number, 0])
     _, system, positions = filaments.build()
     _touching(filaments, system)
     centres = np.array([own[0] for own in filaments.body_indices])
