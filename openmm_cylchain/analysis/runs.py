@@ -103,7 +103,7 @@ class Run:
             _SHAPES[own.shape](own.point, own.vector, own.length) for own in description.walls
         )
         self.complete = description.frames in (None, frames)
-        self._found_contacts_of: tuple[tuple[int, ...], list[DescribedContactFinder]] = (), []
+        self._found_contacts_of: tuple[tuple[int, ...] | None, list[DescribedContactFinder]] = None, []
 
     def __len__(self) -> int:
         """Number of frames."""

@@ -144,9 +144,9 @@ def capsule_contact_force(
     from .. import plugin
 
     require_filaments(filaments)
-    if diameter is None and len(filaments):
-        raise InputError("Filaments need a diameter at which they touch.")
-    diameters = np.zeros(0) if diameter is None else filament_diameters(diameter, len(filaments))
+    diameters = np.zeros(0)
+    if len(filaments) or diameter is not None:
+        diameters = filament_diameters(diameter, len(filaments))
     spheres = outside_particles(filaments, system, particles)
     sphere_diameters = particle_diameters(particles, particle_diameter)
     for own in (*diameters, *sphere_diameters):
@@ -194,7 +194,7 @@ def as_capsule_contact_force(force: openmm.Force) -> Any | None:
 
 def _exclude_within_bodies(force, filaments, spheres):
     owners = {int(particle): body for body, own in enumerate(filaments.body_indices) for particle in own}
-    of_bodies = {}
+    of_bodies: dict[int, list[int]] = {}
     for number, particle in enumerate(spheres):
         if int(particle) in owners:
             of_bodies.setdefault(owners[int(particle)], []).append(number)

@@ -19,7 +19,7 @@ from .capsule_contacts import as_capsule_contact_force
 
 @dataclass(frozen=True)
 class ContactFrame:
-    """The contacts of a frame: every place where two segments, or a segment and a sphere, overlap.
+    """The contacts of a frame: every place where two segments, two spheres, or a segment and a sphere, overlap.
 
     Attributes
     ----------

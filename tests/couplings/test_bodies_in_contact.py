@@ -304,5 +304,5 @@ def test_what_spheres_without_filaments_need():
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     filaments.add_straight(F_ACTIN, 2, [0, 0, 0], [1, 0, 0])
     _, system, _ = filaments.build()
-    with pytest.raises(InputError, match="need a diameter"):
+    with pytest.raises(InputError, match="diameter must be a number"):
         capsule_contact_force(filaments, system)

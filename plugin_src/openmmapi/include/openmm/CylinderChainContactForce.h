@@ -18,7 +18,7 @@ namespace OpenMM {
  * counts once.  Energy and force are bounded: two lines meet for (k/2) d^2.
  *
  * Segments that share a particle, or whose numbers in their chain differ by no more than a number that is given with
- * the chain, do not touch each other.
+ * the chain, do not touch each other.  Add exclusions for the spheres of a rigid body.
  *
  * The force is taken at the present positions, with every Integrator.  After a Context has been created, the stiffness
  * and diameters may be changed: call updateParametersInContext() to copy them over.
@@ -159,8 +159,8 @@ public:
      */
     void updateParametersInContext(Context& context);
     /**
-     * Get the contacts at the present positions of a Context: every place where two segments, or a segment and a
-     * sphere, overlap.
+     * Get the contacts at the present positions of a Context: every place where two segments, two spheres, or a segment
+     * and a sphere, overlap.
      *
      * @param context          a Context with this force
      * @param[out] ends        four numbers for each contact: the chain and the segment of the first side, and those of
