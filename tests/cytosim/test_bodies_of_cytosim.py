@@ -128,6 +128,27 @@ def test_ends_of_fibers_that_touch_each_other_are_apart(tmp_path):
     assert 100.0 < distances.min() < 120.0
 
 
+def test_bodies_push_each_other_where_steric_is_on(tmp_path):
+    """With the stiffness of steric, at the sum of their radii; fibers without steric would be pushed, too."""
+    head = HEAD.replace("set simul system {", "set simul system { steric = 1, 100;")
+    beads = "set bead ball { steric = 1 }\nset bead ghost { steric = 0 }\nnew 3 ball { radius = 1 }\n"
+    beads += "new 2 ghost { radius = 0.5 }\n"
+    found, document = translated(tmp_path, beads, head.replace("set fiber tube {", "set bead tube {"))
+    assert document.missing == []
+    assert found.contacts.diameter is None and found.contacts.stiffness == pytest.approx(100 * PN_PER_UM)
+    assert [own.contacts for own in found.bodies] == [True, False]
+    built = build_system(found, None, 1)
+    assert "CylinderChainContactForce" in [force.getName() for force in built.system.getForces()]
+    found, document = translated(tmp_path, beads, head)
+    assert found.contacts is None and document.missing == ["contacts that differ between filaments"]
+    touching = head.replace("rigidity = 20;", "rigidity = 20; steric = 1, 0.05;").replace(
+        "confine = inside, 100 }\nset aster", "steric = 1 }\nset aster"
+    )
+    text = "new star { solid = core; radius = 0.6; fibers = 4, tube, ( length = 2; ) }\n"
+    found, document = translated(tmp_path, text, touching)
+    assert not found.bodies[0].contacts and document.missing == ["contacts of bodies that hold fibers"]
+
+
 def test_solids_have_points_radii_and_singles(tmp_path):
     text = """new core {
         point1 = 0 0 -1, 0.5
