@@ -63,13 +63,13 @@ def holding_links(configuration, filaments):
     return parts
 
 
-def spheres_of_bodies(configuration, filaments, contacts):
-    """Particles and radii in nm of the spheres of bodies; of those that take part in contacts, or of all."""
+def spheres_of_bodies(configuration, filaments, takes, most=None):
+    """Particles and radii in nm of the spheres of those bodies whose BodyGroup ``takes``: the first ones of each."""
     particles, radii = [], []
     for number, placed in enumerate(filaments.bodies):
-        if contacts and not group_of(number, configuration.bodies).contacts:
+        if not takes(group_of(number, configuration.bodies)):
             continue
-        spheres = placed.body.radii > 0.0
+        spheres = np.flatnonzero(placed.body.radii > 0.0)[:most]
         particles += filaments.body_indices[number][spheres].tolist()
         radii += placed.body.radii[spheres].tolist()
     return particles, np.array(radii)
