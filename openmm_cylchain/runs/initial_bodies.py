@@ -63,11 +63,12 @@ def holding_links(configuration, filaments):
     return parts
 
 
-def spheres_of_bodies(configuration, filaments, takes, most=None):
-    """Particles and radii in nm of the spheres of those bodies whose BodyGroup ``takes``: the first ones of each."""
+def spheres_of_bodies(configuration, filaments, groups, most=None):
+    """Particles and radii in nm of the spheres of the bodies of some BodyGroups, or of the first ones of each."""
     particles, radii = [], []
     for number, placed in enumerate(filaments.bodies):
-        if not takes(group_of(number, configuration.bodies)):
+        own = group_of(number, configuration.bodies)
+        if not any(group is own for group in groups):
             continue
         spheres = np.flatnonzero(placed.body.radii > 0.0)[:most]
         particles += filaments.body_indices[number][spheres].tolist()

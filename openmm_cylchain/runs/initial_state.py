@@ -73,7 +73,8 @@ def build_system(configuration, engine, seed, kinetics=True, begun=None):
     topology, system, positions = filaments.build(box_vectors(configuration.box))
     positions, spheres, radii, friction = _add_particles(configuration, seed, topology, system, positions)
     present = filaments if all(own.takes_part for own in filaments) else FilamentsThatTakePart(filaments)
-    touching, touching_radii = spheres_of_bodies(configuration, filaments, lambda group: group.contacts)
+    in_contact = [group for group in configuration.bodies if group.contacts]
+    touching, touching_radii = spheres_of_bodies(configuration, filaments, in_contact)
     count = add_links(configuration, filaments, system, seed)
     add_joints(configuration, filaments, system)
     tables = configuration.tables
@@ -94,7 +95,8 @@ def build_system(configuration, engine, seed, kinetics=True, begun=None):
     for own, entries in zip(configuration.walls, tables["wall"]):
         held = [number for number, name in enumerate(names) if own.held_types is None or name in own.held_types]
         most = 1 if own.nodes == "first" else None
-        enclosed, enclosed_radii = spheres_of_bodies(configuration, filaments, lambda it: own.holds(it.body), most)
+        bodies = [group for group in configuration.bodies if own.holds(group.body)]
+        enclosed, enclosed_radii = spheres_of_bodies(configuration, filaments, bodies, most)
         every = [*(spheres[number] for number in held), *enclosed], np.concatenate([radii[held], enclosed_radii])
         with entries.naming():
             system.addForce(_wall(own, present, system, *every))
