@@ -1,28 +1,18 @@
 """What is held on surfaces: where it is and its energies, in steps over a factor of 100, against integrals."""
 
-import copy
-
 import numpy as np
-import openmm
 import pytest
 
 from openmm_cylchain import (
     F_ACTIN,
-    Body,
-    Box,
     Capsule,
-    Crosslinks,
     Cylinder,
     Ellipsoid,
     Filaments,
     FilamentType,
-    InputError,
     Plane,
-    Slab,
     Sphere,
-    constant_force,
     filament_wall_force,
-    wall_forces,
 )
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
