@@ -13,7 +13,7 @@ _ABSENT = {
 }
 """What a table has while what it describes is not there."""
 _WITHOUT = {"speed": "0 um/s", "unbinding_force": "1e+06 pN", "stall_force": "1e+06 pN", "rest_length": "0 um"}
-_WITHOUT |= {"walks_backward": False, "same_filament": False, "propulsion": "0 pN"}
+_WITHOUT |= {"walks_backward": False, "same_filament": False, "propulsion": "0 pN", "side": "inside", "nodes": "all"}
 """Values that say the same as none."""
 _NOT_COMPARED = ("duration", "longest", "name", "type", "seed", "platform")
 _PLACES = ("position", "inside", "direction", "orientation", "nodes", "tangents", "file", "start", "height", "normal")
