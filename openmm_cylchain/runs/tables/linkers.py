@@ -294,7 +294,7 @@ def _volume(entries, walls, box):
         reason = (
             f"which what there is of [[wall]] and [box] does not say: add a [[wall]] that is closed (a sphere, a "
             f"capsule, an ellipsoid or a box{'' if box is None else ' that is no larger than the periodic one'}), or"
-            if walls
+            if any(wall.held_types is None for wall in walls)
             else f"which nothing says: add a periodic [box] with edges = {EDGES.example}, or"
         )
         raise entries.error(
