@@ -26,7 +26,7 @@ WALL_NAME = "Wall"
 SIDES = ("inside", "outside", "surface")
 """Where a wall keeps filaments."""
 
-NODES = {"all": slice(None), "ends": [0, -1], "first": slice(1), "last": slice(-1, None)}
+NODES: dict[str, Any] = {"all": slice(None), "ends": [0, -1], "first": slice(1), "last": slice(-1, None)}
 """Which of their nodes it holds, by names."""
 
 

@@ -29,8 +29,8 @@ _OF_BODIES = {
     "point_inside": ("inside", "first"),
 }
 """Modes of confine as side and nodes of a wall."""
-_WHOLE = ("inside", "1", "outside", "point_inside")
-"""Modes in which centres of a body are confined, where here its spheres are."""
+_WHOLE = "all_inside"
+"""The mode in which bodies are confined with their spheres: in others, with their centres."""
 _ONE_FACE = ("sphere", "cylinder", "capsule", "ellipsoid")
 
 
@@ -48,14 +48,18 @@ def add_walls(translation):
         every.append(fiber.name)
         for key in ("confine", "confine2"):
             for own in _of_fiber(translation, fiber, key):
-                found.setdefault(own, {})[fiber.name] = fiber.settings.line_of(key)
+                found.setdefault((own, None), {})[fiber.name] = fiber.settings.line_of(key)
     for body in dict.fromkeys((own.name, own.property) for own in translation.bodies):
         name, settings = body[0], translation.script.properties[body[1]].settings
         every.append(name)
         for own in _of_body(translation, name, settings):
-            found.setdefault(own, {})[name] = settings.line_of("confine")
-    for own, held in found.items():
-        _add_wall(translation, own, held, every)
+            whole = settings.text("confine") == _WHOLE
+            # The first bodies say it of the wall of fibers.
+            if (own, None) in found:
+                found[own, whole] = found.pop((own, None))
+            found.setdefault((own, whole), {})[name] = settings.line_of("confine")
+    for (own, whole), held in found.items():
+        _add_wall(translation, own, whole, held, every)
 
 
 def _of_fiber(translation, fiber, key):
@@ -95,13 +99,10 @@ def _of_body(translation, name, settings):
     if mode not in _OF_BODIES:
         translation.left_out(f"confine = {mode} of {name}", line, f"surfaces: confine = {mode}")
         return
-    if mode in _WHOLE:
-        side = mode if mode == "outside" else "inside"
-        translation.document.note(NEAREST, f"{name} is {side} of walls as a whole; in Cytosim, its points are", line)
     yield _Confinement(space, stiffness, *_OF_BODIES[mode])
 
 
-def _add_wall(translation, own, held, every):
+def _add_wall(translation, own, whole, held, every):
     line = next(iter(held.values()))
     space = translation.space(own.space)
     if space is None or space.walls is None:
@@ -109,11 +110,11 @@ def _add_wall(translation, own, held, every):
         translation.left_out(f"the wall of the shape {shape}", line, f"walls: {shape}")
         return
     curved = [wall for wall in space.walls if wall["shape"] in _ONE_FACE]
-    if own.side != "inside" and (len(curved) != 1 or (own.side == "outside" and len(space.walls) > 1)):
-        what = f"what is on the surface of a {space.shape}" if own.side == "surface" else f"outside of a {space.shape}"
-        translation.left_out(what, line, f"surfaces: {own.side} of a {space.shape}")
+    if own.side != "inside" and len(curved) != 1:
+        what = "what is on the surface" if own.side == "surface" else "what is outside"
+        translation.left_out(f"{what} of a {space.shape}", line, f"surfaces: {own.side} of a {space.shape}")
         return
-    for wall in space.walls:
+    for wall in curved if own.side == "outside" else space.walls:
         side = own.side if wall in curved else "inside"
         table = translation.document.table("[[wall]]", line)
         for key, value in wall.items():
@@ -121,8 +122,12 @@ def _add_wall(translation, own, held, every):
         table.add("stiffness", quantity(own.stiffness, "pN/um"), Note(EXACT, "of each node"))
         if side != "inside":
             table.add("side", side)
+            if side == "outside" and len(space.walls) > 1:
+                table.comment(Note(NEAREST, "as if it had no ends"))
         elif own.side == "surface":
             table.comment(Note(NEAREST, "its ends keep inside what Cytosim holds on them where they are nearest"))
+        if whole is False and own.side != "surface":
+            table.add("whole", False, Note(EXACT, "as the centres of bodies are in Cytosim"))
         if own.nodes != "all":
             table.add("nodes", own.nodes)
         if len(held) < len(every):

@@ -430,8 +430,7 @@ def _add_particles(configuration, seed, topology, system, positions):
 def _wall(own, filaments, system, spheres, radii):
     numbers = [number for number, filament in enumerate(filaments) if own.holds(filament.type)]
     if filaments.engine == "compiled":
-        if own.side == "surface":
-            radii = np.zeros(len(radii))
+        radii = radii * own.whole
         for radius in radii:
             if own.side == "inside" and radius >= own.shape.room:
                 raise InputError(f"a particle with a radius of {radius:g} nm does not fit into it.")

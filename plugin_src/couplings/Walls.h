@@ -124,8 +124,8 @@ inline bool actsAt(const Wall& wall, double depth) {
 double getRoom(const Wall& wall);
 
 /**
- * Find how deep a particle is beyond a face, negative where it is free. The depth of an ellipsoid is (s-1)/|grad s| with s^2 the
- * sum of (x_i/a_i)^2, that of its surface to first order.
+ * Find how deep a particle is beyond a face, negative where it is free. The depth of an ellipsoid is (s-1)/|grad s|
+ * with s^2 the sum of (x_i/a_i)^2, that of its surface to first order.
  *
  * @param position       three numbers
  * @param radius         of the particle
@@ -148,8 +148,8 @@ void addTurning(const Wall& wall, const double* gradient, double size, double* t
 void findCurvature(const Wall& wall, const double* position, double* curvature);
 
 /**
- * Find the mean gradient J of the depth beyond a surface with one face from x to y: the depth changes by J.(y-x), however far
- * that is. It is the same from y to x.
+ * Find the mean gradient J of the depth beyond a surface with one face from x to y: the depth changes by J.(y-x),
+ * however far that is. It is the same from y to x.
  */
 void findMeanGradient(const Wall& wall, const double* x, const double* y, double* gradient);
 

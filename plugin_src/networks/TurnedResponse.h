@@ -11,8 +11,8 @@ namespace cylchain {
  * Find how a force along a coupling moves what it holds, if others hold that together with it. The compliance is small
  * along these others and large across, so that its product with the direction changes much as soon as that turns by
  * little. But couplings that share places turn together: what counts is where they are against each other, which the
- * first iteration knows. So its response turns with the direction. Taken with a direction that turns alone, it would not
- * let the iteration end.
+ * first iteration knows. So its response turns with the direction. Taken with a direction that turns alone, it would
+ * not let the iteration end.
  *
  * @param direction       m, of any size
  * @param first           t, that of the first iteration, a unit vector

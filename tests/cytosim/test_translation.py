@@ -463,6 +463,10 @@ def test_walls_on_surfaces_outside_and_of_bodies(tmp_path):
     found, document = walls("confine = on, 100", "confine = outside, 50, core")
     assert found == [("surface", "all", ("tube",), "Sphere"), ("outside", "all", ("actin",), "Capsule")]
     assert document.missing == []
+    found, document = walls("confine = inside, 100", "confine = inside, 100", "confine = inside, 100")
+    assert (
+        found == [("inside", "all", None, "Sphere")] and document.tables_called("[[wall]]")[0].value("whole") is False
+    )
     found, document = walls("confine = inside, 100", "confine = inside, 100", "confine = on, 500")
     assert found == [("inside", "all", ("tube", "actin"), "Sphere"), ("surface", "all", ("pole",), "Sphere")]
     found, document = walls("confine = both_ends, 100", "confine = plus_end, 100, core", "confine = point, 500")
@@ -474,6 +478,9 @@ def test_walls_on_surfaces_outside_and_of_bodies(tmp_path):
     found, document = walls("confine = surface, 100, tin")
     assert found == [("surface", "all", ("tube",), "Cylinder"), ("inside", "all", ("tube",), "Slab")]
     assert any("ends keep inside" in note.text for note in document.notes) and document.missing == []
+    found, document = walls("confine = outside, 100, tin")
+    assert found == [("outside", "all", ("tube",), "Cylinder")]
+    assert any("no ends" in note.text for note in document.notes) and document.missing == []
     found, document = walls("confine = in_out, 20, 50, core", "confine = in_out, 50, 20, core")
     assert [own[:3] for own in found] == [
         ("surface", "all", None),
@@ -482,7 +489,7 @@ def test_walls_on_surfaces_outside_and_of_bodies(tmp_path):
     ]
     for confine, needs in (
         ("on, 100, carton", "surfaces: surface of a square"),
-        ("outside, 100, tin", "surfaces: outside of a cylinder"),
+        ("outside, 100, carton", "surfaces: outside of a square"),
         ("elsewhere, 100", "surfaces: confine = elsewhere"),
     ):
         found, document = walls(f"confine = {confine}")

@@ -67,6 +67,13 @@ WALL = TableKind(
             "from both sides. For shapes with one face.",
         ),
         Key(
+            "whole",
+            Flag("false"),
+            True,
+            "Whether bodies and particles are inside or outside with all of their spheres; if not, with the centres of "
+            "these.",
+        ),
+        Key(
             "nodes",
             Choice(tuple(NODES)),
             "all",
@@ -208,6 +215,7 @@ class Wall:
     number: int = 0
     side: str = "inside"
     nodes: str = "all"
+    whole: bool = True
 
     @property
     def encloses_all(self):
@@ -279,8 +287,9 @@ def read_wall(entries):
         raise entries.at("side").error(f'must be "inside" of a {entries["shape"]}, which has several faces.')
     if side != "outside" and entries["distance"] >= shape.room:
         raise entries.at("distance").error(f"must be below {shape.room:g} nm to fit into the shape.")
+    whole = entries["whole"] and side != "surface"
     names = ("stiffness", "distance", "holds")
-    return Wall(shape, *(entries[name] for name in names), entries.place.path[1], side, entries["nodes"])
+    return Wall(shape, *(entries[name] for name in names), entries.place.path[1], side, entries["nodes"], whole)
 
 
 def walls_of_all(walls):

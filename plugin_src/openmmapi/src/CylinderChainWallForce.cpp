@@ -65,7 +65,8 @@ void CylinderChainWallForce::setRegion(const string& shape, const Vec3& point, c
                 "The upper corner of a box must exceed the lower one along every axis");
     if (kind == WallShape::Ellipsoid)
         requireOfWall(vector[0] > 0 && vector[1] > 0 && vector[2] > 0, "Semi-axes must be positive");
-    const Wall found = {kind, walls.wall.side, {point[0], point[1], point[2]}, {stored[0], stored[1], stored[2]}, length};
+    const Wall found = {kind, walls.wall.side, {point[0], point[1], point[2]}, {stored[0], stored[1], stored[2]},
+            length};
     requireOneFace(found);
     walls.wall = found;
 }

@@ -103,7 +103,8 @@ void CylinderChainWallForceImpl::updateParametersInContext(ContextImpl& context)
     if (!same)
         throw OpenMMException("CylinderChainWallForce: Particles cannot be added to a Context");
     if ((walls.wall.side == WallSide::Surface) != (present.wall.side == WallSide::Surface))
-        throw OpenMMException("CylinderChainWallForce: A wall cannot become a surface in a Context, nor a surface a wall");
+        throw OpenMMException("CylinderChainWallForce: A wall cannot become a surface in a Context, nor a surface a "
+                "wall");
     walls = present;
     kernel.getAs<CalcCylinderChainWallForceKernel>().copyParametersToContext(context, walls);
     versionOfSurroundings++;
