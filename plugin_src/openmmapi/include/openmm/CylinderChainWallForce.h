@@ -74,8 +74,8 @@ public:
     /**
      * Set on which side of the surface of the region particles are kept.  The others than "inside" are for shapes with
      * one face: not for slabs and boxes.  Outside, the depth d is that to which a sphere around a particle gets into
-     * the region.  On the surface, the energy is (k/2) d^2 with the depth d of the sphere beyond the surface, positive or
-     * negative: the particle is held by its radius inside of it.  A Context that has a surface keeps it.
+     * the region.  On the surface, the energy is (k/2) d^2 with the depth d of the sphere beyond the surface, positive
+     * or negative: the particle is held by its radius inside of it.  A Context that has a surface keeps it.
      *
      * @param side  "inside", which is what there is without this, "outside" or "surface"
      */
