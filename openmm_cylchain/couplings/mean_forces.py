@@ -35,7 +35,7 @@ class WallForces:
     loads : (n,) force
         The sum of the sizes of the forces of each face: over its area, it is the pressure. A ``Slab`` has two faces, of
         which the first is the one that its normal points at, a ``Box`` six (lower x, upper x, lower y, ...), other
-        shapes have one.
+        shapes have one. What holds filaments on a surface has the sum of its forces inwards, less those outwards.
     sums : (n, 3) force
         The sum of the forces of each face on what it keeps in.
     """

@@ -23,6 +23,12 @@ from .shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Spher
 
 WALL_NAME = "Wall"
 
+SIDES = ("inside", "outside", "surface")
+"""Where a wall keeps filaments."""
+
+NODES: dict[str, Any] = {"all": slice(None), "ends": [0, -1], "first": slice(1), "last": slice(-1, None)}
+"""Which of their nodes it holds, by names."""
+
 
 def wall_force(shape: Shape, stiffness: Scalar, particles: Indices) -> openmm.CustomExternalForce:
     """A CustomExternalForce with the energy (k/2) d^2 of each particle, for its depth d beyond a wall.
@@ -68,6 +74,8 @@ def filament_wall_force(
     particles: Indices = (),
     particle_radius: Numbers = 0.0,
     numbers: Indices | None = None,
+    side: str = "inside",
+    nodes: str = "all",
 ) -> Any:
     """A wall around the nodes of filaments, which implicit schemes have in their equations.
 
@@ -76,6 +84,11 @@ def filament_wall_force(
     gets beyond the wall: that of ``wall_force`` at a radius of zero. Scheme "implicit" has the wall in its equations:
     its stiffness does not limit the step. Scheme "implicit-second-order" refuses it. In other schemes, and in other
     Integrators, it is explicit.
+
+    With ``side="outside"``, nodes are kept outside of the shape, with the depth to which they get into it. With
+    ``side="surface"``, they are held on its surface from both sides, with the energy ``(k/2) d^2`` for the signed depth
+    d of what has the radius around a node: nodes are a radius inside. Both are for shapes with one face: not for slabs
+    and boxes.
 
     Parameters
     ----------
@@ -93,6 +106,10 @@ def filament_wall_force(
     particle_radius : length, or array of lengths, one for each of ``particles``
     numbers : sequence of int, optional
         Of the filaments that the wall holds; others go through it. All of them if not given.
+    side : {"inside", "outside", "surface"}
+        Where nodes are kept.
+    nodes : {"all", "ends", "first", "last"}
+        Which nodes, or beads, of each filament are; others go through the wall. Filaments that grow need all.
 
     Returns
     -------
@@ -103,9 +120,9 @@ def filament_wall_force(
     Raises
     ------
     InputError
-        If the compiled engine is missing, for a shape that is none, a stiffness that is not positive, a radius that is
-        negative or does not fit in, a filament that does not exist, or a particle that does not or is one of the
-        filaments'.
+        If the compiled engine is missing, for a shape that is none or does not have the side, a side or nodes that
+        there are not, a stiffness that is not positive, a radius that is negative or does not fit in, a filament that
+        does not exist, or a particle that does not or is one of the filaments'.
     """
     choose_engine("compiled")
     from .. import plugin
@@ -115,19 +132,35 @@ def filament_wall_force(
     stiffness = positive(stiffness, STIFFNESS, "stiffness")
     require_filaments(filaments)
     held = _held(numbers, len(filaments))
-    radii = _radii(radius, len(held), "radius", shape)
+    _choice(side, "side", SIDES)
+    _choice(nodes, "nodes", NODES)
+    if side != "inside" and len(shape.faces) > 1:
+        raise InputError(f'side must be "inside" of a {type(shape).__name__}, which has several faces.')
+    room = np.inf if side == "outside" else shape.room
+    radii = _radii(radius, len(held), "radius", room)
     spheres = outside_particles(filaments, system, particles)
-    sphere_radii = _radii(particle_radius, len(spheres), "particle_radius", shape)
+    sphere_radii = _radii(particle_radius, len(spheres), "particle_radius", room)
     name, point, direction, length = shape.region
     force = plugin.CylinderChainWallForce(name, openmm.Vec3(*point), openmm.Vec3(*direction), length, stiffness)
-    force.setName(f"CylinderChainWallForce ({name})")
+    force.setSide(side)
+    force.setName(
+        f"CylinderChainWallForce ({name})" if side == "inside" else f"CylinderChainWallForce ({name}, {side})"
+    )
     for index, value in zip(held, radii):
-        nodes, beads = filaments.node_indices[index], filaments.bead_indices[index]
-        for place in filaments[index].type.segment_kind.particles_along(nodes, beads):
+        own = filaments.node_indices[index], filaments.bead_indices[index]
+        places = np.array(filaments[index].type.segment_kind.particles_along(*own))
+        if nodes != "all" and filaments[index].closed:
+            raise InputError(f'Filament {index} is a ring, without ends: nodes must be "all", but is "{nodes}".')
+        for place in places[NODES[nodes]]:
             force.addParticle(int(place), float(value))
     for particle, value in zip(spheres, sphere_radii):
         force.addParticle(int(particle), float(value))
     return force
+
+
+def _choice(value, name, choices):
+    if not isinstance(value, str) or value not in choices:
+        raise InputError(f"{name} must be one of {', '.join(choices)}, but is {shown(value)}.")
 
 
 def _held(numbers, count):
@@ -142,15 +175,15 @@ def _held(numbers, count):
     return held
 
 
-def _radii(value, count, name, shape):
+def _radii(value, count, name, room):
     values = np.asarray(in_units_of(value, LENGTH, name))
     if values.ndim and values.shape != (count,):
         raise InputError(f"{name} must be a number or have {count} entries, but has the shape {values.shape}.")
     values = np.broadcast_to(values, (count,))
     if not np.all(values >= 0.0):
         raise InputError(f"{name} cannot be negative, but is {values.min():g}.")
-    if not np.all(values < shape.room):
-        raise InputError(f"{name} must be below {shape.room:g} nm to fit into the shape, but is {values.max():g}.")
+    if not np.all(values < room):
+        raise InputError(f"{name} must be below {room:g} nm to fit into the shape, but is {values.max():g}.")
     return values
 
 

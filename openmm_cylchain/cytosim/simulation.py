@@ -1,4 +1,4 @@
-"""simul and run as [solvent], [box], [contacts], [[wall]] and [simulation]."""
+"""simul and run as [solvent], [box], [contacts] and [simulation]."""
 
 import math
 
@@ -14,7 +14,6 @@ _MOST_STEPS_PER_FRAME = 10**7
 _STILL = 1e8
 """In pN s/um^2: a viscosity in which fibers stand still."""
 _NOT_SOLVED = ("off", "0")
-_CONFINED = ("inside", "all_inside", "1")
 
 
 def thermal_energy(simul):
@@ -105,75 +104,6 @@ def add_box(translation):
     table = translation.document.table("[box]")
     note = Note(EXACT, f"space of the shape {space.shape}; of an edge that does not repeat, any length")
     table.add("edges", [quantity(edge, "um") for edge in edges], note)
-
-
-def add_walls(translation):
-    """The [[wall]] tables of what fibers are confined by."""
-    found, fibers = {}, translation.fibers_made()
-    for fiber in fibers:
-        for key in ("confine", "confine2"):
-            confinement = _confinement(translation, fiber, key)
-            if confinement is not None:
-                found.setdefault(confinement, {})[fiber.name] = fiber.settings.line_of(key)
-    _add_walls_of_bodies(translation, found, fibers)
-    for (name, stiffness), held in found.items():
-        line = next(iter(held.values()))
-        space = translation.space(name)
-        if space is None or space.walls is None:
-            shape = translation.shape_name(name)
-            translation.left_out(f"the wall of the shape {shape}", line, f"walls: {shape}")
-            continue
-        for wall in space.walls:
-            table = translation.document.table("[[wall]]", line)
-            for key, value in wall.items():
-                table.add(key, value, Note(EXACT, f"confine = inside, {stiffness:g}" if key == "shape" else "", line))
-            table.add("stiffness", quantity(stiffness, "pN/um"), Note(EXACT, "of each node"))
-            if len(held) < len(fibers):
-                names = [translation.type_name(fiber) for fiber in held]
-                table.add("holds", names, Note(EXACT, f"of {', '.join(held)} alone"))
-
-
-def _confinement(translation, fiber, key):
-    # The name of a space and the stiffness of its wall in pN/um, or None.
-    settings = fiber.settings
-    mode, line = settings.text(key), settings.line_of(key)
-    settings.values(f"{key}_stiffness")
-    if mode in OFF:
-        return None
-    if mode not in _CONFINED:
-        translation.left_out(f"{key} = {mode} of {fiber.name}", line, f"surfaces: confine = {mode}")
-        return None
-    stiffness = settings.number((key, 1), f"{key}_stiffness", default=0.0)
-    if stiffness <= 0.0:
-        translation.document.note(EXACT, f"{key} of {fiber.name} has no stiffness", line)
-        return None
-    return settings.confining_space(key), stiffness
-
-
-def _add_walls_of_bodies(translation, found, fibers):
-    # Walls that hold all filaments act on bodies as well, and others on none.
-    for name in dict.fromkeys(own.property for own in translation.bodies):
-        body = translation.script.properties[name]
-        settings, line = body.settings, body.settings.line_of("confine")
-        mode = settings.text("confine")
-        stiffness = settings.number(("confine", 1), "confine_stiffness", default=0.0)
-        space = settings.confining_space()
-        of_all = [own for (own, _), held in found.items() if len(held) >= len(fibers)]
-        if mode in OFF or stiffness == 0.0:
-            if of_all:
-                text = f"{name} is not confined in Cytosim, but walls of all filaments are for all bodies here"
-                translation.document.note(NEAREST, text, body.line)
-        elif mode not in _CONFINED:
-            translation.left_out(f"confine = {mode} of {name}", line, f"surfaces: confine = {mode}")
-        elif space not in of_all and (found or fibers):
-            text = f"confine = {mode} of {name}: walls of bodies are those of all filaments here"
-            translation.left_out(text, line, "walls for some bodies alone")
-        else:
-            if mode != "all_inside":
-                text = f"{name} is inside of walls as a whole; in Cytosim, its points are"
-                translation.document.note(NEAREST, text, line)
-            if not of_all:
-                found[space, stiffness] = {name: line}
 
 
 def add_simulation(translation):

@@ -13,7 +13,8 @@ _ABSENT = {
 }
 """What a table has while what it describes is not there."""
 _WITHOUT = {"speed": "0 um/s", "unbinding_force": "1e+06 pN", "stall_force": "1e+06 pN", "rest_length": "0 um"}
-_WITHOUT |= {"walks_backward": False, "same_filament": False, "propulsion": "0 pN"}
+_WITHOUT |= {"walks_backward": False, "same_filament": False, "propulsion": "0 pN", "side": "inside", "nodes": "all"}
+_WITHOUT |= {"whole": True}
 """Values that say the same as none."""
 _NOT_COMPARED = ("duration", "longest", "name", "type", "seed", "platform")
 _PLACES = ("position", "inside", "direction", "orientation", "nodes", "tangents", "file", "start", "height", "normal")
@@ -50,6 +51,7 @@ def add_stages(document, later, runs, unbound):
     for name in _REPEATED:
         _complete(name, stages, document, later)
     _longest(stages, document)
+    _name_all_held(stages, document)
     for number, (own, duration, run) in enumerate(zip(stages, durations, runs)):
         table = document.table("[[stage]]", run.line)
         table.add("name", f"run {number + 1}")
@@ -160,6 +162,19 @@ def _longest(stages, document):
                 inner.entries = [
                     (key, longest if key == "longest" else value, note) for key, value, note in inner.entries
                 ]
+
+
+def _name_all_held(stages, document):
+    # A wall that holds some things in a stage says in all of them what it holds.
+    walls = document.tables_called("[[wall]]")
+    for index, table in enumerate(walls):
+        if not any("holds" in own["wall"][index] for own in stages):
+            continue
+        for own in stages:
+            names = [one["name"] for kind in ("filament", "body") for one in own.get(kind, [])]
+            own["wall"][index].setdefault("holds", list(dict.fromkeys(names)))
+        if table.value("holds") is None:
+            table.add("holds", stages[0]["wall"][index]["holds"], Note(EXACT, "all"))
 
 
 def _add_changes(document, before, after, line, unbound):

@@ -21,12 +21,12 @@ from .simulation import (
     add_contacts,
     add_simulation,
     add_solvent,
-    add_walls,
     contact_diameter,
     thermal_energy,
 )
 from .spaces import make_space
 from .stages import add_stages
+from .walls import add_walls
 
 _BODIES = {
     "nucleus": "bodies: nuclei",

@@ -218,9 +218,9 @@ def _configuration(raw, text, folder, lines):
     groups = _filaments(tables, solvent, box, folder, monomers)
     if not groups:
         _refuse_without_filaments(tables)
-    check_walls(tables["wall"], walls, groups)
     seed = read_seed(settings)
     bodies = tuple(read_body(own, tables, groups, box, seed) for own in tables["body"])
+    check_walls(tables["wall"], walls, groups, bodies, [own["name"] for own in tables["particles"]])
     groups = with_bodies(groups, bodies)
     linkers = tuple(read_linkers(own, groups, box, seed, walls, bodies) for own in tables["linkers"])
     configuration = Configuration(
@@ -347,8 +347,9 @@ def _check_engine(settings, configuration):
         if there:
             raise settings.at("engine").error(f'has no {header}: leave it out, or write "compiled".')
     for entries in configuration.tables["wall"]:
-        if entries["distance"]:
-            raise entries.at("distance").error("needs the compiled engine: leave it out.")
+        for key, usual in (("distance", 0.0), ("side", "inside"), ("nodes", "all")):
+            if entries[key] != usual:
+                raise entries.at(key).error("needs the compiled engine: leave it out.")
 
 
 def _disturbed(configuration):

@@ -63,13 +63,14 @@ def holding_links(configuration, filaments):
     return parts
 
 
-def spheres_of_bodies(configuration, filaments, contacts):
-    """Particles and radii in nm of the spheres of bodies; of those that take part in contacts, or of all."""
+def spheres_of_bodies(configuration, filaments, groups, most=None):
+    """Particles and radii in nm of the spheres of the bodies of some BodyGroups, or of the first ones of each."""
     particles, radii = [], []
     for number, placed in enumerate(filaments.bodies):
-        if contacts and not group_of(number, configuration.bodies).contacts:
+        own = group_of(number, configuration.bodies)
+        if not any(group is own for group in groups):
             continue
-        spheres = placed.body.radii > 0.0
+        spheres = np.flatnonzero(placed.body.radii > 0.0)[:most]
         particles += filaments.body_indices[number][spheres].tolist()
         radii += placed.body.radii[spheres].tolist()
     return particles, np.array(radii)

@@ -73,7 +73,8 @@ def build_system(configuration, engine, seed, kinetics=True, begun=None):
     topology, system, positions = filaments.build(box_vectors(configuration.box))
     positions, spheres, radii, friction = _add_particles(configuration, seed, topology, system, positions)
     present = filaments if all(own.takes_part for own in filaments) else FilamentsThatTakePart(filaments)
-    touching, touching_radii = spheres_of_bodies(configuration, filaments, contacts=True)
+    in_contact = [group for group in configuration.bodies if group.contacts]
+    touching, touching_radii = spheres_of_bodies(configuration, filaments, in_contact)
     count = add_links(configuration, filaments, system, seed)
     add_joints(configuration, filaments, system)
     tables = configuration.tables
@@ -90,11 +91,15 @@ def build_system(configuration, engine, seed, kinetics=True, begun=None):
                 own.excluded_neighbors,
             )
         system.addForce(force)
-    enclosed, enclosed_radii = spheres_of_bodies(configuration, filaments, contacts=False)
-    spheres, radii = [*spheres, *enclosed], np.concatenate([radii, enclosed_radii])
+    names = [own.name for own in configuration.particles for _ in range(own.count)]
     for own, entries in zip(configuration.walls, tables["wall"]):
+        held = [number for number, name in enumerate(names) if own.held_types is None or name in own.held_types]
+        most = 1 if own.nodes == "first" else None
+        bodies = [group for group in configuration.bodies if own.holds(group.body)]
+        enclosed, enclosed_radii = spheres_of_bodies(configuration, filaments, bodies, most)
+        every = [*(spheres[number] for number in held), *enclosed], np.concatenate([radii[held], enclosed_radii])
         with entries.naming():
-            system.addForce(_wall(own, present, system, spheres, radii))
+            system.addForce(_wall(own, present, system, *every))
     for own, entries in zip(configuration.pulls, tables["pull"]):
         with entries.naming():
             system.addForce(_pull(own, filaments))
@@ -424,12 +429,10 @@ def _add_particles(configuration, seed, topology, system, positions):
 
 def _wall(own, filaments, system, spheres, radii):
     numbers = [number for number, filament in enumerate(filaments) if own.holds(filament.type)]
-    if own.held_types is not None:
-        spheres, radii = [], []
     if filaments.engine == "compiled":
-        room = own.shape.room
+        radii = radii * own.whole
         for radius in radii:
-            if radius >= room:
+            if own.side == "inside" and radius >= own.shape.room:
                 raise InputError(f"a particle with a radius of {radius:g} nm does not fit into it.")
         return filament_wall_force(
             filaments,
@@ -440,6 +443,8 @@ def _wall(own, filaments, system, spheres, radii):
             spheres,
             radii if len(spheres) else 0.0,
             numbers,
+            own.side,
+            own.nodes,
         )
     nodes = [int(node) for number in numbers for node in filaments.node_indices[number]]
     return wall_force(own.shape, own.stiffness, [*nodes, *spheres])

@@ -228,7 +228,8 @@ def _draw_forces(axes, configuration, directory, times):
 def _face_label(wall, number, face):
     # As files name shapes.
     kind = type(wall.shape).__name__.lower().replace("slab", "slit")
-    label, faces = f"wall {number}, {kind}", len(wall.shape.faces)
+    side = {"inside": "", "outside": "outside of a ", "surface": "surface of a "}[wall.side]
+    label, faces = f"wall {number}, {side}{kind}", len(wall.shape.faces)
     if faces == 6:
         return f"{label}, {('lower', 'upper')[face % 2]} {'xyz'[face // 2]}"
     return f"{label}, {('upper', 'lower')[face]} face" if faces == 2 else label

@@ -228,13 +228,14 @@ class Filaments(TiedFilaments):
         It is that of the filament that allows the least (see ``timestep``), and, if a System is given, of its forces:
         crosslinks, joints and capsule contacts of the compiled engine are in the equations of its implicit schemes.
         Joints do not bind the step; the others do only as the places that they join or keep apart diffuse against each
-        other, and links as they move the gaps of contacts and walls (see ``coupled_step``). All others act from the
-        start of a step, and a spring of the stiffness k on a place of the response mu h to a force in a step h has a
-        variance too large by 1/(1 - k mu h/2). mu h is that of the place on the straight filament (see ``mobility``),
-        or h/gamma of a particle. The step leaves 5 % at most, with all forces at once. Known are HarmonicBondForce,
-        crosslinks, walls, contacts, constant forces, tethers, and CustomBondForce and CustomExternalForce that are
-        harmonic; walls as if all their particles were in contact, and contacts of two filaments as if they crossed at
-        their ends, or touched all along with an error of a third.
+        other, links as they move the gaps of contacts and walls, and walls that hold filaments on a curved surface, or
+        outside, by its radius of curvature (see ``coupled_step``). All others act from the start of a step, and a
+        spring of the stiffness k on a place of the response mu h to a force in a step h has a variance too large by
+        1/(1 - k mu h/2). mu h is that of the place on the straight filament (see ``mobility``), or h/gamma of a
+        particle. The step leaves 5 % at most, with all forces at once. Known are HarmonicBondForce, crosslinks, walls,
+        contacts, constant forces, tethers, and CustomBondForce and CustomExternalForce that are harmonic; walls as if
+        all their particles were in contact, and contacts of two filaments as if they crossed at their ends, or touched
+        all along with an error of a third.
         Other forces are listed in ``unknown_forces``. Filaments that constant forces, tethers or propulsion compress
         bind it by the rate with which they buckle (see ``buckling_step``). Where ends that grow may push walls or
         contacts, they gain a fifth of a monomer in a step, which resolves contacts (see ``growth_step``).

@@ -5,7 +5,8 @@ z2 move against each other by the mean square 2 k_B T dt (1/z1 + 1/z2) along eac
 (0.6 d)^2, where d is the rest length of a link, whose direction a step would lose otherwise, or the distance at which
 two filaments touch, which would often be predicted on the wrong sides of each other. Harmonic links of rest length zero
 have no direction, and do not bind. FENE links always have one: d of those of rest length zero is their length in
-equilibrium, (3 k_B T/k)^(1/2), or their maximum extension if that is less.
+equilibrium, (3 k_B T/k)^(1/2), or their maximum extension if that is less. What holds a place on a curved surface, or
+keeps it outside of one, is as a link to its centre of curvature, with the least radius of curvature for d.
 
 A place in contact moves as a segment does, or as the end of a filament that is short: that of a rod of n segments has
 the mobility (1/zeta + l0^2/(4 zeta_r))/n across it, with the friction zeta and zeta_r of a segment that moves and
@@ -49,9 +50,8 @@ RELATIVE_MOTION_OF_SPHERES = 0.2
 LARGEST_LINKED_MOTION = 0.6
 """The largest product of a step, the mobility of two places, and the stiffness of a link in series with a contact."""
 
-_REASON = (
-    "{what}: the two may diffuse against each other by {share:g} of {distance}, {value:.3g} nm, in an implicit step"
-)
+_REASON = "{what}: {motion} by {share:g} of {distance}, {value:.3g} nm, in an implicit step"
+_OF_TWO, _OF_ONE = "the two may diffuse against each other", "it may diffuse"
 
 
 def steps_of_couplings(
@@ -77,13 +77,17 @@ def steps_of_couplings(
     for index, force in coupled:
         label = f"{force.getName()} (force {index})"
         capsules = as_capsule_contact_force(force)
+        wall = as_filament_wall_force(force)
         if capsules is not None:
             found = [_contacts(capsules, mobility_in_contact), _spheres_in_contact(capsules, filaments, mobility)]
+        elif wall is not None:
+            found = [_curved_wall(wall, mobility)]
         else:
             found = [_links(force, filaments, mobility, kT)]
+        motion = _OF_TWO if wall is None else _OF_ONE
         for distance, total, what, of_what, share in filter(None, found):
             bound = distance**2 / (2.0 * kT * total)
-            reason = _REASON.format(what=what, share=share, distance=of_what, value=distance)
+            reason = _REASON.format(what=what, motion=motion, share=share, distance=of_what, value=distance)
             name = f"{label}: {what}"
             allowed = float(share**2 * bound)
             steps.append(TimeStep(allowed, f"{label}: {reason}", {name: float(bound)}, {name: allowed}))
@@ -118,7 +122,10 @@ def steps_of_linked_contacts(
 
 
 def _stiffness_of_surface(force):
-    surface = as_capsule_contact_force(force) or as_filament_wall_force(force)
+    wall = as_filament_wall_force(force)
+    if wall is not None and wall.getSide() == "surface":
+        return 0.0
+    surface = as_capsule_contact_force(force) or wall
     return 0.0 if surface is None else surface.getStiffness()._value
 
 
@@ -200,6 +207,24 @@ def _worst_pair(kinds, what, share):
     if worst is None:
         return None
     return distance.ravel()[worst], total.ravel()[worst], what, "the contact distance", share
+
+
+def _curved_wall(force, mobility):
+    # What is kept inside comes back from wherever it gets to.
+    radius = _least_radius(force)
+    largest = max((mobility[force.getParticle(own)] for own in range(force.getNumParticles())), default=0.0)
+    if force.getSide() == "inside" or math.isinf(radius) or largest == 0.0:
+        return None
+    what = "what it holds" if force.getSide() == "surface" else "what it keeps outside"
+    return radius, largest, what, "the radius of curvature", RELATIVE_MOTION
+
+
+def _least_radius(force):
+    # In nm, of a surface with one face.
+    shape, _, vector, length = (getattr(value, "_value", value) for value in force.getRegion())
+    if shape == "ellipsoid":
+        return min(vector) ** 2 / max(vector)
+    return math.inf if shape == "plane" else float(length)
 
 
 def _links(force, filaments, mobility, kT):

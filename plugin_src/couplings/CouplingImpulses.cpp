@@ -31,7 +31,7 @@ double cylchain::findPushes(const WallSystem& system, const double* positions, v
         for (int face = 0; face < faces; face++) {
             double gradient[3];
             const double depth = findDepth(system.wall, face, positions+3*own.particle, own.radius, gradient);
-            if (!(depth > 0))
+            if (!actsAt(system.wall, depth))
                 continue;
             energy += 0.5*system.stiffness*depth*depth;
             pushes.push_back(pushOfWall(system, i, face, system.stiffness*depth, gradient));

@@ -11,7 +11,7 @@ double EndWalls::findEnergy(const vector<Vec3d>& nodes, int end, int count, doub
         const double x[] = {node.x, node.y, node.z};
         for (int face = 0; face < countFaces(wall); face++) {
             const double depth = findDepth(wall, face, x, radius, gradient);
-            if (depth > 0)
+            if (actsAt(wall, depth))
                 energy += 0.5*stiffness*depth*depth;
         }
     }

@@ -7,6 +7,9 @@
 using namespace cylchain;
 using namespace std;
 
+/** The least distance from the middle of a shape, and the differences by which curvatures are found, over its size. */
+static const double LEAST_DISTANCE = 1e-6, OF_DIFFERENCES = 1e-4;
+
 /** Take a vector that begins at the point of a wall to where the middle of its round face is nearest. */
 static void beginInMiddle(const Wall& wall, double* r) {
     const double* v = wall.vector;
@@ -19,7 +22,8 @@ static void beginInMiddle(const Wall& wall, double* r) {
         r[k] -= along*v[k];
 }
 
-bool cylchain::encloses(const Wall& wall, const double* position) {
+/** Whether a point is in the region itself. */
+static bool isWithin(const Wall& wall, const double* position) {
     const double* v = wall.vector;
     double r[3];
     for (int k = 0; k < 3; k++)
@@ -49,6 +53,10 @@ bool cylchain::encloses(const Wall& wall, const double* position) {
     return false;
 }
 
+bool cylchain::encloses(const Wall& wall, const double* position) {
+    return wall.side == WallSide::Surface || isWithin(wall, position) == (wall.side == WallSide::Inside);
+}
+
 bool cylchain::encloses(const vector<Wall>& walls, const double* position) {
     for (const Wall& wall : walls)
         if (!encloses(wall, position))
@@ -58,7 +66,8 @@ bool cylchain::encloses(const vector<Wall>& walls, const double* position) {
 
 /** The corners of a box around a closed wall; false if it is open. */
 static bool findBoundsOf(const Wall& wall, double* lower, double* upper) {
-    if (wall.shape == WallShape::Plane || wall.shape == WallShape::Slab || wall.shape == WallShape::Cylinder)
+    if (wall.side != WallSide::Inside || wall.shape == WallShape::Plane || wall.shape == WallShape::Slab ||
+            wall.shape == WallShape::Cylinder)
         return false;
     for (int k = 0; k < 3; k++) {
         const double ofVector = wall.shape == WallShape::Sphere ? 0 : fabs(wall.vector[k]);
@@ -72,7 +81,7 @@ static bool findBoundsOf(const Wall& wall, double* lower, double* upper) {
 /** The corners of a box around what is in a cylinder and in a slab across it; false if they are others. */
 static bool findBoundsOf(const Wall& cylinder, const Wall& slab, double* lower, double* upper) {
     if (cylinder.shape != WallShape::Cylinder || slab.shape != WallShape::Slab ||
-            fabs(dot(cylinder.vector, slab.vector)) < 1-1e-9)
+            cylinder.side != WallSide::Inside || fabs(dot(cylinder.vector, slab.vector)) < 1-1e-9)
         return false;
     double between[3];
     for (int k = 0; k < 3; k++)
@@ -101,7 +110,7 @@ bool cylchain::findBounds(const vector<Wall>& walls, double* lower, double* uppe
 bool cylchain::isBounded(const vector<Wall>& walls, bool periodic) {
     double lower[3], upper[3];
     return findBounds(walls, lower, upper) || (periodic && none_of(walls.begin(), walls.end(), [] (const Wall& wall) {
-        return wall.shape == WallShape::Plane;
+        return wall.shape == WallShape::Plane && wall.side != WallSide::Surface;
     }));
 }
 
@@ -184,7 +193,8 @@ static double findDepthInEllipsoid(const Wall& wall, const double* r, double* gr
     return depth;
 }
 
-double cylchain::findDepth(const Wall& wall, int face, const double* position, double radius, double* gradient) {
+/** The depth of a point beyond a face of the region. */
+static double findDepthBeyond(const Wall& wall, int face, const double* position, double* gradient) {
     const double* v = wall.vector;
     double r[3];
     for (int k = 0; k < 3; k++)
@@ -193,12 +203,12 @@ double cylchain::findDepth(const Wall& wall, int face, const double* position, d
         case WallShape::Plane:
             for (int k = 0; k < 3; k++)
                 gradient[k] = -v[k];
-            return radius-dot(v, r);
+            return -dot(v, r);
         case WallShape::Slab: {
             const double sign = face == 0 ? 1 : -1;
             for (int k = 0; k < 3; k++)
                 gradient[k] = sign*v[k];
-            return sign*dot(v, r)-0.5*wall.length+radius;
+            return sign*dot(v, r)-0.5*wall.length;
         }
         case WallShape::Sphere:
         case WallShape::Cylinder:
@@ -212,19 +222,28 @@ double cylchain::findDepth(const Wall& wall, int face, const double* position, d
             else
                 for (int k = 0; k < 3; k++)
                     gradient[k] = distance > 1e-12*wall.length ? r[k]/distance : up[k];
-            return distance-wall.length+radius;
+            return distance-wall.length;
         }
         case WallShape::Box: {
             const int axis = face/2;
             const double sign = face%2 == 0 ? -1 : 1;
             for (int k = 0; k < 3; k++)
                 gradient[k] = k == axis ? sign : 0;
-            return (sign < 0 ? wall.point[axis]-position[axis] : position[axis]-v[axis])+radius;
+            return sign < 0 ? wall.point[axis]-position[axis] : position[axis]-v[axis];
         }
         case WallShape::Ellipsoid:
-            return findDepthInEllipsoid(wall, r, gradient)+radius;
+            return findDepthInEllipsoid(wall, r, gradient);
     }
     return 0;
+}
+
+double cylchain::findDepth(const Wall& wall, int face, const double* position, double radius, double* gradient) {
+    const double depth = findDepthBeyond(wall, face, position, gradient);
+    if (wall.side != WallSide::Outside)
+        return depth+radius;
+    for (int k = 0; k < 3; k++)
+        gradient[k] = -gradient[k];
+    return radius-depth;
 }
 
 void cylchain::addTurning(const Wall& wall, const double* g, double size, double* turning) {
@@ -238,4 +257,72 @@ void cylchain::addTurning(const Wall& wall, const double* g, double size, double
     for (int i = 0; i < 3; i++)
         for (int k = i; k < 3; k++)
             turning[entry++] += size*((i == k ? 1 : 0)-g[i]*g[k]-along*axis[i]*axis[k]);
+}
+
+void cylchain::findCurvature(const Wall& wall, const double* position, double* curvature) {
+    fill_n(curvature, 6, 0.0);
+    if (isFlat(wall))
+        return;
+    double gradient[3];
+    if (isRound(wall)) {
+        const double distance = findDepthBeyond(wall, 0, position, gradient)+wall.length;
+        addTurning(wall, gradient, 1/max(distance, LEAST_DISTANCE*wall.length), curvature);
+    }
+    else {
+        double rows[3][3];
+        for (int axis = 0; axis < 3; axis++) {
+            double before[3], after[3], moved[3] = {position[0], position[1], position[2]};
+            const double way = OF_DIFFERENCES*wall.vector[axis];
+            moved[axis] = position[axis]-way;
+            findDepthBeyond(wall, 0, moved, before);
+            moved[axis] = position[axis]+way;
+            findDepthBeyond(wall, 0, moved, after);
+            for (int k = 0; k < 3; k++)
+                rows[axis][k] = (after[k]-before[k])/(2*way);
+        }
+        int entry = 0;
+        for (int i = 0; i < 3; i++)
+            for (int k = i; k < 3; k++)
+                curvature[entry++] = 0.5*(rows[i][k]+rows[k][i]);
+    }
+}
+
+void cylchain::findMeanGradient(const Wall& wall, const double* x, const double* y, double* gradient) {
+    double way[3], ofX[3], ofY[3];
+    const double before = findDepth(wall, 0, x, 0, ofX), after = findDepth(wall, 0, y, 0, ofY);
+    for (int k = 0; k < 3; k++)
+        way[k] = y[k]-x[k];
+    if (isRound(wall)) {
+        // As of the vector r from the middle: (r(x)+r(y))/(|r(x)|+|r(y)|).
+        const double fromX = wall.length+before, fromY = wall.length+after;
+        const double sum = max(fromX+fromY, LEAST_DISTANCE*wall.length);
+        for (int k = 0; k < 3; k++)
+            gradient[k] = (fromX*ofX[k]+fromY*ofY[k])/sum;
+        if (wall.shape != WallShape::Capsule)
+            return;
+    }
+    else {
+        double middle[3];
+        for (int k = 0; k < 3; k++)
+            middle[k] = 0.5*(x[k]+y[k]);
+        findDepth(wall, 0, middle, 0, gradient);
+        if (isFlat(wall))
+            return;
+    }
+    // O. Gonzalez, J. Nonlinear Sci. 1996, 6, 449. Rounding would be divided by what is next to nothing.
+    const double square = dot(way, way);
+    if (!(square > LEAST_DISTANCE*LEAST_DISTANCE*getRoom(wall)*getRoom(wall)))
+        return;
+    const double lacks = (after-before-dot(gradient, way))/square;
+    for (int k = 0; k < 3; k++)
+        gradient[k] += lacks*way[k];
+}
+
+bool cylchain::passesThrough(const Wall& wall, const double* x, const double* y) {
+    if (wall.side != WallSide::Outside || isFlat(wall))
+        return false;
+    double before[3], after[3];
+    findDepth(wall, 0, x, 0, before);
+    findDepth(wall, 0, y, 0, after);
+    return dot(before, after) < 0;
 }

@@ -5,6 +5,7 @@
 #include "mechanics/Prefetch.h"
 #include "mechanics/SymmetricMatrices.h"
 #include "networks/StageWeights.h"
+#include "networks/TurnedResponse.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -367,24 +368,6 @@ void LinkEquations::setCompliances(const double* compliances) {
 }
 
 /**
- * Find how a force along a link that shares its places with others moves them apart. The compliance is small along
- * these others and large across, so that its product with the direction changes much as soon as that turns by little.
- * But links that share places turn together: what counts is where they are against each other, which the first
- * iteration knows. So its response turns with the link. Taken with a direction that turns alone, it would not let the
- * iteration end.
- */
-void LinkEquations::turnResponse(const State& state, double* response) {
-    const double *m = state.direction, *t = state.first, *w = state.firstResponse;
-    const double size = sqrt(dot(m, m)), perSize = 1/max(size, LEAST);
-    double axis[3];
-    for (int k = 0; k < 3; k++)
-        axis[k] = (t[(k+1)%3]*m[(k+2)%3]-t[(k+2)%3]*m[(k+1)%3])*perSize;
-    const double cosine = dot(t, m)*perSize, along = dot(axis, w)/max(1+cosine, LEAST);
-    for (int k = 0; k < 3; k++)
-        response[k] = size*(cosine*w[k]+axis[(k+1)%3]*w[(k+2)%3]-axis[(k+2)%3]*w[(k+1)%3]+along*axis[k]);
-}
-
-/**
  * Find the metric force, and by how much the response along the direction must be larger than that of the distance, so
  * that a force along the direction changes the distance as it does.
  */
@@ -397,7 +380,7 @@ double LinkEquations::describeMetric(const State& state, const double* r, double
     if (state.alone)
         multiply(state.compliance, m, response);
     else
-        turnResponse(state, response);
+        turnResponse(m, state.first, state.firstResponse, response);
     const double along = dot(m, response);
     const double least = LEAST_LENGTH*(state.link->restLength+state.link->maximumExtension);
     const double before = max(state.length, least), after = max(state.distance, least);

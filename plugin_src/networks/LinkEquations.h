@@ -106,7 +106,6 @@ private:
     double findChange(const State& state, const double* move) const;
     bool turnsTooMuch(const State& state, const double* move, double least) const;
     bool hasFailed(std::size_t number, const double* moved) const;
-    static void turnResponse(const State& state, double* response);
     double describeMetric(const State& state, const double* r, double* force) const;
     void vectorOf(const State& state, const double* positions, double* r) const;
     std::vector<State> states;

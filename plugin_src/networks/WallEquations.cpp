@@ -92,7 +92,8 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
                 state.offset = depth-(g[0]*y[0]+g[1]*y[1]+g[2]*y[2]);
                 // The distance from the middle. Where it is short, there would be more stiffness than steps can have.
                 const double distance = depth-particle.radius+system->wall.length;
-                state.curvature = isRound(system->wall) ? 1/max(distance, LARGEST_WAY_TO_FACE*system->wall.length) : 0;
+                const bool turns = isRound(system->wall) && system->wall.side != WallSide::Outside;
+                state.curvature = turns ? 1/max(distance, LARGEST_WAY_TO_FACE*system->wall.length) : 0;
             }
             state.equation = -1;
             const double beyond = findDepthAt(state, moved)+state.restGap.get();
@@ -115,7 +116,9 @@ RestGap WallEquations::findRestGap(int particle, int face, double depth) const {
     const WallParticle& own = system->particles[particle];
     double gradient[3];
     const double before = findDepth(system->wall, face, positionOf(particle, begun).at, own.radius, gradient);
-    const double largest = isFlat(system->wall) ? HUGE_VAL : LARGEST_WAY_TO_FACE*(getRoom(system->wall)-own.radius);
+    const double sign = system->wall.side == WallSide::Outside ? -1 : 1;
+    const double largest = isFlat(system->wall) ? HUGE_VAL :
+            LARGEST_WAY_TO_FACE*(getRoom(system->wall)-sign*own.radius);
     return RestGap(max(-largest, -depth), min(largest, -before), system->stiffness*responses[particle],
             wallDepth);
 }
@@ -220,20 +223,33 @@ bool WallEquations::markUnfinished(PackFlags& packs) const {
     return true;
 }
 
-void WallEquations::findFailures(const double*, vector<bool>& failed) {
+/** Whether a particle that is kept outside has passed the wall. */
+bool WallEquations::hasPassed(int i, const double* moved) const {
+    return places[i].pack >= 0 && passesThrough(system->wall, positionOf(i, begun).at, positionOf(i, moved).at);
+}
+
+void WallEquations::findFailures(const double* moved, vector<bool>& failed) {
     for (const Part& part : parts)
         for (const State& state : part.states)
             if (state.unfinished)
                 failed[places[state.particle].chain] = true;
+    for (size_t i = 0; i < places.size() && system->wall.side == WallSide::Outside; i++)
+        if (hasPassed(i, moved))
+            failed[places[i].chain] = true;
 }
 
-bool WallEquations::findCulprit(const double*, const CouplingEquation*, BrokenCoupling& culprit) const {
+bool WallEquations::findCulprit(const double* moved, const CouplingEquation*, BrokenCoupling& culprit) const {
+    auto find = [&] (int particle) {
+        culprit.places[0] = describePlace(places[particle]);
+        return true;
+    };
     for (const Part& part : parts)
         for (const State& state : part.states)
-            if (state.unfinished) {
-                culprit.places[0] = describePlace(places[state.particle]);
-                return true;
-            }
+            if (state.unfinished)
+                return find(state.particle);
+    for (size_t i = 0; i < places.size(); i++)
+        if (hasPassed(i, moved))
+            return find(i);
     return false;
 }
 

@@ -33,7 +33,7 @@ public:
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;
     bool finishIteration(const double* moves, const double* moved) override;
     bool markUnfinished(PackFlags& packs) const override;
-    /** A wall has no other side that a step could get to: chains fail if iterations end before a depth has settled. */
+    /** Chains fail if iterations end before a depth has settled, or if they pass what keeps them outside. */
     void findFailures(const double* moved, std::vector<bool>& failed) override;
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
     void findPushes(const double* moved, std::vector<Push>& pushes) const override;
@@ -73,6 +73,7 @@ private:
         return places[particle].pack >= 0 && (*active)[places[particle].pack];
     }
     void finishPart(int part, const double* moves, const double* moved);
+    bool hasPassed(int particle, const double* moved) const;
     bool isBesideDeeper(int particle, int face, double depth, const double* moved) const;
     RestGap findRestGap(int particle, int face, double depth) const;
     const WallSystem* system = nullptr;

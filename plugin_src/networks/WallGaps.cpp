@@ -15,9 +15,9 @@ const double LEAST_WAY_TO_MIDDLE = 0.5;
 /** Particles that a thread looks at together. */
 const int CHUNK_OF_WALL_GAPS = 256;
 
-/** How a unit force on a round face turns with it. */
+/** How a unit force on a round face turns with it, if that makes steps stiffer. */
 void findTurning(const Wall& wall, const double* g, double distance, double* turning) {
-    if (!isRound(wall))
+    if (!isRound(wall) || wall.side == WallSide::Outside)
         return;
     // Where the middle is near, there would be more stiffness than steps can have.
     fill_n(turning, 6, 0.0);
@@ -137,12 +137,28 @@ bool WallGaps::findGaps(int, bool, const double* moved, ReflectedGaps& gaps) {
     return false;
 }
 
-bool WallGaps::findCulprit(const double*, const CouplingEquation*, BrokenCoupling& culprit) const {
+/** Whether a particle that is kept outside has passed the wall. What is kept inside has no other side to get to. */
+bool WallGaps::hasPassed(int i, const double* moved) const {
+    return places[i].pack >= 0 && passesThrough(system->wall, positionOf(i, begun).at, positionOf(i, moved).at);
+}
+
+void WallGaps::findFailures(const double* moved, vector<bool>& failed) {
+    for (size_t i = 0; i < places.size() && system->wall.side == WallSide::Outside; i++)
+        if (hasPassed(i, moved))
+            failed[places[i].chain] = true;
+}
+
+bool WallGaps::findCulprit(const double* moved, const CouplingEquation*, BrokenCoupling& culprit) const {
+    auto find = [&] (int particle) {
+        culprit.places[0] = describePlace(places[particle]);
+        return true;
+    };
     for (const State& state : states)
-        if (all->isUnfinished(state.gap)) {
-            culprit.places[0] = describePlace(places[state.particle]);
-            return true;
-        }
+        if (all->isUnfinished(state.gap))
+            return find(state.particle);
+    for (size_t i = 0; i < places.size(); i++)
+        if (hasPassed(i, moved))
+            return find(i);
     return false;
 }
 

@@ -34,9 +34,7 @@ public:
     Rests getRests() const override {
         return Rests::Wrong;
     }
-    void findFailures(const double*, std::vector<bool>&) override {
-        // A wall has no other side: its gaps tell.
-    }
+    void findFailures(const double* moved, std::vector<bool>& failed) override;
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
     void findPushes(const double* moved, std::vector<Push>& pushes) const override;
     void findNeighbours(std::vector<std::pair<int, int> >&) const override {
@@ -57,6 +55,7 @@ private:
     WallPosition positionOf(int particle, const double* positions) const {
         return cylchain::positionOf(system->particles[particle], positions);
     }
+    bool hasPassed(int particle, const double* moved) const;
     void follow(const State& state, const double* moved, Gap& gap) const;
     void findNew(int part, const double* moved);
     /** Those of steps that do not resolve contacts beside them. */

@@ -174,6 +174,85 @@ static void testTurning() {
     check(caps > 20 && caps < 180, "positions beside the cylinder and beside the caps");
 }
 
+/** Depths change by the mean gradient along a way, which is that of the way back. */
+static void testMeanGradients() {
+    NormalNumbers normal(5);
+    for (Wall wall : WALLS) {
+        if (countFaces(wall) > 1)
+            continue;
+        wall.side = WallSide::Surface;
+        for (int i = 0; i < 300; i++) {
+            Array x = normal(3), y = normal(3);
+            double there[3], back[3], unused[3], change = 0;
+            findMeanGradient(wall, x.data(), y.data(), there);
+            findMeanGradient(wall, y.data(), x.data(), back);
+            for (int k = 0; k < 3; k++) {
+                change += there[k]*(y[k]-x[k]);
+                checkClose(there[k], back[k], 1, 1e-9, "the way back");
+            }
+            const double expected = findDepth(wall, 0, y.data(), 0, unused)-findDepth(wall, 0, x.data(), 0, unused);
+            checkClose(expected, change, 1, 1e-9, "the change of a depth");
+        }
+    }
+}
+
+/** Second derivatives of depths, against differences of gradients. */
+static void testCurvatures() {
+    NormalNumbers normal(6);
+    const double width = 1e-5;
+    for (const Wall& wall : WALLS) {
+        if (countFaces(wall) > 1)
+            continue;
+        for (int i = 0; i < 100; i++) {
+            Array x = normal(3);
+            double g[3], above[3], below[3], curvature[6];
+            for (int k = 0; k < 3; k++)
+                x[k] += wall.point[k]+(x[k] > 0 ? 1 : -1);
+            findDepth(wall, 0, x.data(), 0, g);
+            findCurvature(wall, x.data(), curvature);
+            int entry = 0;
+            for (int j = 0; j < 3; j++)
+                for (int k = j; k < 3; k++) {
+                    const double here = x[k];
+                    x[k] = here+width;
+                    findDepth(wall, 0, x.data(), 0, above);
+                    x[k] = here-width;
+                    findDepth(wall, 0, x.data(), 0, below);
+                    x[k] = here;
+                    checkClose((above[j]-below[j])/(2*width), curvature[entry++], 1, 2e-4, "a second derivative");
+                }
+        }
+    }
+}
+
+/** What is outside has the opposite depth and gradient, and is enclosed where others are not. */
+static void testSides() {
+    NormalNumbers normal(7);
+    for (const Wall& wall : WALLS) {
+        if (countFaces(wall) > 1)
+            continue;
+        Wall outside = wall, surface = wall;
+        outside.side = WallSide::Outside;
+        surface.side = WallSide::Surface;
+        int passed = 0;
+        for (int i = 0; i < 100; i++) {
+            const Array x = normal(3), y = normal(3);
+            double inwards[3], outwards[3];
+            const double depth = findDepth(wall, 0, x.data(), 0, inwards);
+            checkClose(0.25-depth, findDepth(outside, 0, x.data(), 0.25, outwards), 1, 1e-13, "a depth outside");
+            for (int k = 0; k < 3; k++)
+                checkClose(-inwards[k], outwards[k], 1, 0, "a direction outside");
+            check(encloses(wall, x.data()) != encloses(outside, x.data()), "one of both sides");
+            check(encloses(surface, x.data()) && actsAt(surface, depth), "a surface is everywhere");
+            check(!passesThrough(wall, x.data(), y.data()), "nothing to pass through");
+            passed += passesThrough(outside, x.data(), y.data());
+        }
+        check(isFlat(wall) ? passed == 0 : passed > 20 && passed < 80, "ways to the other side");
+        double lower[3], upper[3];
+        check(!findBounds({outside}, lower, upper), "the outside has no bounds");
+    }
+}
+
 static void testMiddles() {
     for (const Wall& wall : WALLS) {
         if (wall.shape == WallShape::Box || wall.shape == WallShape::Plane)
@@ -195,5 +274,6 @@ static void testMiddles() {
 }
 
 int main() {
-    return runTests({testDepths, testRadii, testGradients, testTurning, testMiddles});
+    return runTests({testDepths, testRadii, testGradients, testTurning, testMeanGradients, testCurvatures, testSides,
+            testMiddles});
 }

@@ -441,9 +441,63 @@ def test_walls_of_some_fibers_and_several_of_one(tmp_path):
     assert document.missing == []
     found, document = translated(tmp_path, fibers + made + "new free { length = 1 }\n", cell=cells)
     assert [wall.held_types for wall in found.walls] == [("tube", "actin"), ("tube",)]
-    outside = fibers.replace("inside, 50", "outside, 50")
-    _, document = translated(tmp_path, outside + made, cell=cells)
-    assert document.missing == ["surfaces: confine = outside"]
+
+
+def test_walls_on_surfaces_outside_and_of_bodies(tmp_path):
+    cells = "set space cell { shape = sphere }\nnew cell { radius = 9 }\n"
+    cells += "set space core { shape = capsule }\nnew core { length = 8; radius = 2 }\n"
+    cells += "set space tin { shape = cylinderZ }\nnew tin { bottom = -3; top = 3; radius = 4 }\n"
+    cells += "set space carton { shape = square }\nnew carton { length = 6, 6, 6 }\n"
+    made = "new 2 tube { length = 2 }\nnew 2 actin { length = 1 }\n"
+
+    def walls(tube, actin="", solid="", more=""):
+        text = (
+            f"set fiber tube {{ rigidity = 20; {tube} }}\nset fiber actin {{ rigidity = 0.07; {actin} }}\n"
+            f"set solid pole {{ {solid} }}\n{made}"
+        )
+        if solid:
+            text += "new pole { point1 = 0 0 0, 0.3; point2 = 0 0 1, 0.1 }\n"
+        found, document = translated(tmp_path, text + more, cell=cells)
+        return [(own.side, own.nodes, own.held_types, type(own.shape).__name__) for own in found.walls], document
+
+    found, document = walls("confine = on, 100", "confine = outside, 50, core")
+    assert found == [("surface", "all", ("tube",), "Sphere"), ("outside", "all", ("actin",), "Capsule")]
+    assert document.missing == []
+    found, document = walls("confine = inside, 100", "confine = inside, 100", "confine = inside, 100")
+    assert (
+        found == [("inside", "all", None, "Sphere")] and document.tables_called("[[wall]]")[0].value("whole") is False
+    )
+    found, document = walls("confine = inside, 100", "confine = inside, 100", "confine = on, 500")
+    assert found == [("inside", "all", ("tube", "actin"), "Sphere"), ("surface", "all", ("pole",), "Sphere")]
+    found, document = walls("confine = both_ends, 100", "confine = plus_end, 100, core", "confine = point, 500")
+    assert [own[:3] for own in found] == [
+        ("surface", "ends", ("tube",)),
+        ("surface", "last", ("actin",)),
+        ("surface", "first", ("pole",)),
+    ]
+    found, document = walls("confine = surface, 100, tin")
+    assert found == [("surface", "all", ("tube",), "Cylinder"), ("inside", "all", ("tube",), "Slab")]
+    assert any("ends keep inside" in note.text for note in document.notes) and document.missing == []
+    found, document = walls("confine = outside, 100, tin")
+    assert found == [("outside", "all", ("tube",), "Cylinder")]
+    assert any("no ends" in note.text for note in document.notes) and document.missing == []
+    found, document = walls("confine = in_out, 20, 50, core", "confine = in_out, 50, 20, core")
+    assert [own[:3] for own in found] == [
+        ("surface", "all", None),
+        ("inside", "all", ("tube",)),
+        ("outside", "all", ("actin",)),
+    ]
+    for confine, needs in (
+        ("on, 100, carton", "surfaces: surface of a square"),
+        ("outside, 100, carton", "surfaces: outside of a square"),
+        ("elsewhere, 100", "surfaces: confine = elsewhere"),
+    ):
+        found, document = walls(f"confine = {confine}")
+        assert found == [] and document.missing == [needs]
+    growing = "confine = plus_end, 100; activity = classic; growing_speed = 0.1, 0; growing_force = 5"
+    assert walls(growing)[1].missing == ["surfaces: ends that grow"]
+    _, document = walls("confine = on, 100", more="run 10 system { nb_frames = 1 }\nchange tube { confine = inside }\n")
+    assert document.missing == []
 
 
 def test_two_dimensions_are_found(tmp_path):

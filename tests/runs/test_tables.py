@@ -526,7 +526,9 @@ def test_walls_hold_types_of_filaments():
     everything = set(range(own.system.getNumParticles()))
     assert held == [everything, actin, tubes] and len(everything - actin - tubes) == 2
     assert sum(filament.growth is not None for filament in own.filaments) == 2
-    assert_refused("names DNA, but filaments of the configuration are ACT", WALL + 'holds = "DSDNA"\n')
+    assert_refused(
+        "names DNA, but filaments, bodies and particles of the configuration are ACT", WALL + 'holds = "DSDNA"\n'
+    )
     assert_refused("which nothing says", WALL + 'holds = "F_ACTIN"\n', LINKERS)
     volume = parse(WALL, WALL.replace("2 um", "1 um") + 'holds = "F_ACTIN"\n', LINKERS).linkers[0].volume
     assert volume == pytest.approx(4e9 / 3 * np.pi * 8)
@@ -534,6 +536,50 @@ def test_walls_hold_types_of_filaments():
     own = build_system(parse(WALL + 'holds = "F_ACTIN"\n', PARTICLES, simulation=simulation), "portable", 3)
     (wall,) = (force for force in own.system.getForces() if force.getName() == "Wall (sphere)")
     assert wall.getNumParticles() == 21
+
+
+BODY = '[[body]]\nname = "POLE"\npositions = [["0 um", "0 um", "0 um"]]\n'
+DUMBBELL = BODY + 'points = [["50 nm", "0 nm", "0 nm"], ["-50 nm", "0 nm", "0 nm"]]\nradii = ["30 nm", "30 nm"]\n'
+
+
+def _walls_of(*tables):
+    """Sides, particles and radii of walls, by their parts of the System."""
+    own = built(*tables)
+    found = [wall for wall in map(as_filament_wall_force, own.system.getForces()) if wall is not None]
+    rows = []
+    for wall in found:
+        held = range(wall.getNumParticles())
+        radii = {wall.getParticleRadius(index)._value for index in held}
+        rows.append((wall.getSide(), [wall.getParticle(index) for index in held], radii))
+    return own, rows
+
+
+def test_sides_of_walls_and_what_they_hold():
+    surface, beads = 'side = "surface"\n', PARTICLES.replace("[[particles]]\n", '[[particles]]\nname = "BEAD"\n')
+    own, walls = _walls_of(
+        WALL,
+        WALL + surface + 'holds = ["POLE", "BEAD"]\n',
+        WALL + surface + 'nodes = "first"\nholds = ["F_ACTIN", "POLE"]\ndistance = "5 nm"\n',
+        WALL.replace("2 um", "10 nm") + 'side = "outside"\nnodes = "ends"\nholds = "F_ACTIN"\ndistance = "20 nm"\n',
+        DUMBBELL,
+        beads,
+    )
+    nodes, bodies = own.filaments.node_indices, own.filaments.body_indices[0][:2]
+    assert [side for side, _, _ in walls] == ["inside", "surface", "surface", "outside"]
+    of_beads = set(range(own.system.getNumParticles())) - set(np.concatenate([*nodes, own.filaments.body_indices[0]]))
+    assert set(walls[1][1]) == of_beads | set(bodies) and walls[1][2] == {0.0}
+    assert set(walls[2][1]) == {*(one[0] for one in nodes), bodies[0]} and walls[2][2] == {5.0, 0.0}
+    assert set(walls[3][1]) == {one[end] for one in nodes for end in (0, -1)} and walls[3][2] == {20.0}
+    slit = '[[wall]]\nshape = "slit"\nthickness = "1 um"\nstiffness = "1 pN/nm"\n'
+    assert_refused("several faces", slit + surface)
+    assert_refused('must be "all" or "first" for the body POLE', WALL + 'nodes = "ends"\n', DUMBBELL)
+    growing = f"{MONOMERS}{FILAMENT.replace('100 nm', '108 nm')}reserve = 1\n{GROWTH}"
+    assert_refused('must be "all" for filaments that grow', WALL + 'nodes = "last"\n', filament=growing)
+    # What is outside leaves a volume that nobody knows, and a surface leaves all.
+    assert_refused("which what there is", WALL, WALL + 'side = "outside"\n', LINKERS)
+    assert parse(WALL, WALL + surface, LINKERS).linkers[0].volume == pytest.approx(4e9 / 3 * np.pi * 8)
+    simulation = TAIL.replace("1 us", "10 ns", 1) + 'engine = "portable"\n'
+    assert_refused("side needs the compiled engine", WALL + surface, simulation=simulation)
 
 
 def test_portable_engine_has_walls_links_and_pulls():

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from ...couplings.walls import NODES, SIDES
 from ...filaments.attachments import lengths_along
 from ...units import quantities as units
 from ..keys import (
@@ -22,7 +23,7 @@ from ..keys import (
 from ..table import ACTIVE, TableKind, group_of
 from .bodies import check_body_point
 from .filament_types import TypeNames
-from .shapes import SHAPE_KEYS, read_shape
+from .shapes import SHAPE_KEYS, read_shape, volume_within
 
 CONTACTS = TableKind(
     "contacts",
@@ -64,10 +65,36 @@ WALL = TableKind(
             0.0,
             "That axes of filaments keep from the wall, such as their radius.",
         ),
-        Key("holds", TypeNames(), None, "Names of filament types that it is for, and for no particles."),
+        Key(
+            "side",
+            Choice(SIDES),
+            "inside",
+            "Where it keeps them: surface holds nodes of filaments, and centres of bodies and particles, on the wall "
+            "from both sides. For shapes with one face.",
+        ),
+        Key(
+            "whole",
+            Flag("false"),
+            True,
+            "Whether bodies and particles are inside or outside with all of their spheres; if not, with the centres of "
+            "these.",
+        ),
+        Key(
+            "nodes",
+            Choice(tuple(NODES)),
+            "all",
+            "Which nodes of filaments it is for; of bodies with several spheres, first is for that of their first "
+            "point, and last and ends are refused.",
+        ),
+        Key(
+            "holds",
+            TypeNames("filaments, bodies or particles", '["F_ACTIN", "POLE"]'),
+            None,
+            "Names of types of filaments, of bodies and of particles that it is for; for all if not given.",
+        ),
         ACTIVE,
     ),
-    "A wall around all filaments, particles and bodies, or filaments of some types, see `filament_wall_force`.",
+    "A wall around all filaments, particles and bodies, or some of them, see `filament_wall_force`.",
     repeated=True,
 )
 
@@ -192,9 +219,17 @@ class Wall:
     distance: float
     held_types: tuple | None = None
     number: int = 0
+    side: str = "inside"
+    nodes: str = "all"
+    whole: bool = True
+
+    @property
+    def encloses_all(self):
+        """Whether all filaments, bodies and particles are inside of it as a whole."""
+        return self.held_types is None and self.side == "inside" and self.nodes == "all"
 
     def holds(self, kind):
-        """Whether it is for filaments of a type."""
+        """Whether it is for filaments of a type, or for bodies or particles of a group, with a name."""
         return self.held_types is None or kind.name in self.held_types
 
 
@@ -253,25 +288,52 @@ def read_contacts(entries, groups):
 
 def read_wall(entries):
     """The Wall of a [[wall]] table."""
-    shape = read_shape(entries)
-    if entries["distance"] >= shape.room:
+    shape, side = read_shape(entries), entries["side"]
+    if side != "inside" and len(shape.faces) > 1:
+        raise entries.at("side").error(f'must be "inside" of a {entries["shape"]}, which has several faces.')
+    if side != "outside" and entries["distance"] >= shape.room:
         raise entries.at("distance").error(f"must be below {shape.room:g} nm to fit into the shape.")
-    return Wall(shape, entries["stiffness"], entries["distance"], entries["holds"], entries.place.path[1])
+    whole = entries["whole"] and side != "surface"
+    names = ("stiffness", "distance", "holds")
+    return Wall(shape, *(entries[name] for name in names), entries.place.path[1], side, entries["nodes"], whole)
 
 
 def walls_of_all(walls):
-    """Shapes of those Walls that hold filaments of all types, and all else."""
-    return [wall.shape for wall in walls if wall.held_types is None]
+    """Shapes of those Walls that all is inside of."""
+    return [wall.shape for wall in walls if wall.encloses_all]
 
 
-def check_walls(tables, walls, groups):
-    """Raise ConfigurationError for a [[wall]] table that holds no filament of FilamentGroups."""
+def volume_of_walls(walls, box):
+    """The volume in nm^3 that Walls and a periodic box leave to what is in neither of them; None if nobody knows."""
+    if any(wall.held_types is None and wall.side == "outside" for wall in walls):
+        return None
+    return volume_within(walls_of_all(walls), box)
+
+
+def check_walls(tables, walls, groups, bodies, particles):
+    """Raise ConfigurationError for a [[wall]] table that holds nothing of FilamentGroups, BodyGroups and particles.
+
+    ``particles`` are names of [[particles]] tables.
+    """
+    there = {group.type.name for group in groups} | {group.body.name for group in bodies} | set(particles)
     for entries, wall in zip(tables, walls):
-        if wall.held_types is not None and not any(wall.holds(group.type) for group in groups):
-            names = sorted({group.type.name for group in groups})
-            raise entries.at("holds").error(
-                f"names {' and '.join(wall.held_types)}, but filaments of the configuration are {', '.join(names)}."
-            )
+        for name in wall.held_types or ():
+            if name not in there:
+                raise entries.at("holds").error(
+                    f"names {name}, but filaments, bodies and particles of the configuration are "
+                    f"{', '.join(sorted(there))}."
+                )
+        if wall.nodes == "all":
+            continue
+        for group in groups:
+            if wall.holds(group.type) and (group.growth is not None or group.closed):
+                what = "grow" if group.growth is not None else "are rings"
+                raise entries.at("nodes").error(f'must be "all" for filaments that {what} ({group.label}).')
+        for group in bodies:
+            if wall.nodes != "first" and wall.holds(group.body) and (group.body.radii > 0.0).sum() > 1:
+                raise entries.at("nodes").error(
+                    f'must be "all" or "first" for the body {group.body.name}, which has several spheres.'
+                )
 
 
 def read_tether(entries, groups):

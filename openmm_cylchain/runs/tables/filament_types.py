@@ -26,18 +26,16 @@ and dimers of tubulin in 13 protofilaments."""
 
 
 class TypeNames:
-    """Names of filament types: one, or a list of them."""
+    """Names of filament types, or of other things: one, or a list of them."""
 
-    example = '"F_ACTIN"'
-    text = "a name of a type of filaments, or a list of them"
+    def __init__(self, things="a type of filaments", example='"F_ACTIN"'):
+        self.text = f"a name of {things}, or a list of them"
+        self.example = example
 
     def read(self, value, place):
         names = [value] if isinstance(value, str) else value
         if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
-            raise place.error(
-                'must be a name of a type of filaments, or a list of them, as in ["F_ACTIN"], but is '
-                f"{as_written(names)}."
-            )
+            raise place.error(f'must be {self.text}, as in ["F_ACTIN"], but is {as_written(names)}.')
         return tuple(PRESETS[name].name if name in PRESETS else name for name in names)
 
     def schema(self):

@@ -16,10 +16,10 @@ from ...kinetics.presets import PRESETS
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Flag, Inline, Key, Listing, Number, Pair, Quantity, Text, Whole, as_written, point
 from ..table import Entries, TableKind
-from .couplings import walls_of_all
+from .couplings import volume_of_walls
 from .filament_types import TypeNames
 from .nucleation import has_places
-from .shapes import REGION, REGION_EXAMPLE, Region, volume_within
+from .shapes import REGION, REGION_EXAMPLE, Region
 from .solvent import EDGES
 
 _QUANTITIES = {
@@ -231,19 +231,21 @@ def read_linkers(entries, groups, box, seed, walls=(), bodies=()):
     with entries.naming():
         as_linkers(group.kind, *first, group.anchors, group.bound, 0, group.diffusion, group.planar, region)
     if group.diffusion is not None:
-        if region is None and len(walls_of_all(walls)) < len(walls):
+        # They are on both sides of what holds filaments on its surface.
+        around = [wall for wall in walls if wall.side != "surface"]
+        if region is None and not all(wall.encloses_all for wall in around):
             raise entries.error(
-                "linkers that diffuse need a region where walls hold filaments of some types: "
+                "linkers that diffuse need a region where walls hold some filaments, or keep them outside: "
                 f"inside = {REGION_EXAMPLE}."
             )
-        if region is None and not is_closed([wall.shape.region for wall in walls], box is not None):
+        if region is None and not is_closed([wall.shape.region for wall in around], box is not None):
             raise entries.error(
                 f"linkers that diffuse need a region: inside = {REGION_EXAMPLE}, a [[wall]] that is closed (a sphere, "
                 f"a capsule, an ellipsoid or a box), or a periodic [box] with edges = {EDGES.example}, in which there "
                 "may be a slit or a cylinder."
             )
     elif group.count is not None and group.volume is None and (box is None or walls):
-        group = dataclasses.replace(group, volume=_volume(entries, walls_of_all(walls), box))
+        group = dataclasses.replace(group, volume=_volume(entries, walls, box))
     names = sorted({own.type.name for own in groups})
     for hand in group.kind.hands:
         if box is not None and hand.reach >= 0.5 * min(box):
@@ -286,13 +288,13 @@ def _check_severing(entries, hand, groups):
             )
 
 
-def _volume(entries, shapes, box):
-    volume = volume_within(shapes, box)
+def _volume(entries, walls, box):
+    volume = volume_of_walls(walls, box)
     if volume is None:
         reason = (
             f"which what there is of [[wall]] and [box] does not say: add a [[wall]] that is closed (a sphere, a "
             f"capsule, an ellipsoid or a box{'' if box is None else ' that is no larger than the periodic one'}), or"
-            if shapes
+            if any(wall.held_types is None for wall in walls)
             else f"which nothing says: add a periodic [box] with edges = {EDGES.example}, or"
         )
         raise entries.error(

@@ -8,8 +8,7 @@ from ...filaments.presets import ACTIN_AGING, ACTIN_ATP, TUBULIN
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Inline, Key, Listing, Quantity, Text, WordOrQuantity
 from ..table import TableKind
-from .couplings import walls_of_all
-from .shapes import volume_within
+from .couplings import volume_of_walls
 from .solvent import EDGES
 
 PRESETS = {"ACTIN_ATP": ACTIN_ATP, "ACTIN_AGING": ACTIN_AGING, "TUBULIN": TUBULIN}
@@ -102,7 +101,7 @@ def read_monomers(entries, box, walls):
         raise entries.error('lacks its rates: add lines such as plus_on_rate = "11.6 1/(uM*s)"')
     volume = entries["volume"]
     if volume == "box":
-        volume = volume_within(walls_of_all(walls), box)
+        volume = volume_of_walls(walls, box)
         if volume is None:
             raise entries.at("volume").error(
                 "is that which walls and the box leave, but they do not say it: add a periodic [box] with edges = "

@@ -51,7 +51,7 @@ CHANGES = {
     "contacts": ("diameter", "stiffness", "excluded_neighbors", "active"),
     "wall": (
         *("point", "normal", "thickness", "center", "radius", "axis", "lower", "upper", "semi_axes", "stiffness"),
-        *("distance", "active"),
+        *("length", "distance", "side", "whole", "nodes", "holds", "active"),
     ),
     "simulation": ("time_step", "report_interval", "checkpoint_interval", "checks"),
 }

@@ -140,7 +140,8 @@ void CylinderChainBindingForceImpl::updateWalls() {
     system.walls.clear();
     for (const ForceImpl* impl : context->getForceImpls()) {
         const CylinderChainWallForceImpl* wall = dynamic_cast<const CylinderChainWallForceImpl*>(impl);
-        if (wall != NULL)
+        // Linkers are on both sides of what holds filaments on its surface.
+        if (wall != NULL && wall->getWall().side != cylchain::WallSide::Surface)
             system.walls.push_back(wall->getWall());
     }
     linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().setWalls(system.walls);

@@ -14,6 +14,12 @@ static void requireOfWall(bool condition, const string& message) {
         throw OpenMMException("CylinderChainWallForce: "+message);
 }
 
+static void requireOneFace(const Wall& wall) {
+    const string side = Names<WallSide>::ALL[static_cast<int>(wall.side)];
+    requireOfWall(wall.side == WallSide::Inside || countFaces(wall) == 1, "Particles cannot be at the "+side+" of a "+
+            Names<WallShape>::ALL[static_cast<int>(wall.shape)]+", which has several faces");
+}
+
 static bool isFinite(const Vec3& v) {
     return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
 }
@@ -59,7 +65,24 @@ void CylinderChainWallForce::setRegion(const string& shape, const Vec3& point, c
                 "The upper corner of a box must exceed the lower one along every axis");
     if (kind == WallShape::Ellipsoid)
         requireOfWall(vector[0] > 0 && vector[1] > 0 && vector[2] > 0, "Semi-axes must be positive");
-    walls.wall = {kind, {point[0], point[1], point[2]}, {stored[0], stored[1], stored[2]}, length};
+    const Wall found = {kind, walls.wall.side, {point[0], point[1], point[2]}, {stored[0], stored[1], stored[2]},
+            length};
+    requireOneFace(found);
+    walls.wall = found;
+}
+
+string CylinderChainWallForce::getSide() const {
+    return Names<WallSide>::ALL[static_cast<int>(walls.wall.side)];
+}
+
+void CylinderChainWallForce::setSide(const string& side) {
+    const std::vector<string> names = namesOf<WallSide>();
+    const size_t number = find(names.begin(), names.end(), side)-names.begin();
+    requireOfWall(number < names.size(), "There is no side '"+side+"'");
+    Wall changed = walls.wall;
+    changed.side = static_cast<WallSide>(number);
+    requireOneFace(changed);
+    walls.wall = changed;
 }
 
 void CylinderChainWallForce::setStiffness(double stiffness) {

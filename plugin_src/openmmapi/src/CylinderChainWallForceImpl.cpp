@@ -22,7 +22,7 @@ WallSystem CylinderChainWallForceImpl::describe() const {
         WallParticle& own = result.particles[i];
         if (found[i].isOnCurve())
             own.onCurve = found[i];
-        if (!(own.radius < getRoom(result.wall)))
+        if (result.wall.side != WallSide::Outside && !(own.radius < getRoom(result.wall)))
             throw OpenMMException("CylinderChainWallForce: Particle "+to_string(own.particle)+
                     " with its radius does not fit into the "+Names<WallShape>::ALL[(int) result.wall.shape]);
     }
@@ -102,6 +102,9 @@ void CylinderChainWallForceImpl::updateParametersInContext(ContextImpl& context)
             });
     if (!same)
         throw OpenMMException("CylinderChainWallForce: Particles cannot be added to a Context");
+    if ((walls.wall.side == WallSide::Surface) != (present.wall.side == WallSide::Surface))
+        throw OpenMMException("CylinderChainWallForce: A wall cannot become a surface in a Context, nor a surface a "
+                "wall");
     walls = present;
     kernel.getAs<CalcCylinderChainWallForceKernel>().copyParametersToContext(context, walls);
     versionOfSurroundings++;

@@ -20,7 +20,7 @@ static void write(const CylinderChainWallForce& force, SerializationNode& node) 
     double length;
     const string shape = force.getRegion(point, vector, length);
     node.setStringProperty("shape", shape).setDoubleProperty("length", length)
-            .setDoubleProperty("stiffness", force.getStiffness());
+            .setDoubleProperty("stiffness", force.getStiffness()).setStringProperty("side", force.getSide());
     addVector(node, "Point", point);
     addVector(node, "Vector", vector);
     SerializationNode& particles = node.createChildNode("Particles");
@@ -33,6 +33,7 @@ static unique_ptr<CylinderChainWallForce> readWallForce(const SerializationNode&
     unique_ptr<CylinderChainWallForce> force(new CylinderChainWallForce(node.getStringProperty("shape"),
             getVector(node, "Point"), getVector(node, "Vector"), node.getDoubleProperty("length"),
             node.getDoubleProperty("stiffness")));
+    force->setSide(node.getStringProperty("side", "inside"));
     for (auto& particle : node.getChildNode("Particles").getChildren())
         force->addParticle(particle.getIntProperty("index"), particle.getDoubleProperty("radius"));
     return force;

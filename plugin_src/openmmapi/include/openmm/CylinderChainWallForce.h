@@ -11,7 +11,7 @@ namespace OpenMM {
 
 /**
  * This class keeps particles in a region: a half space, or the inside of a slab, sphere, cylinder, box,
- * ellipsoid or capsule.
+ * ellipsoid or capsule.  It may also keep them outside of one, or hold them on its surface: see setSide().
  *
  * Where a sphere around a particle gets beyond the surface of the region by a depth d, the energy is (k/2) d^2.  Of a
  * slab or box, each plane counts by itself, so that the energy of a box is that of the distance from it.  The depth of
@@ -65,6 +65,21 @@ public:
      * @param length  see above, measured in nm
      */
     void setRegion(const std::string& shape, const Vec3& point, const Vec3& vector, double length);
+    /**
+     * Get on which side of the surface particles are kept.
+     *
+     * @return "inside", "outside" or "surface"
+     */
+    std::string getSide() const;
+    /**
+     * Set on which side of the surface of the region particles are kept.  The others than "inside" are for shapes with
+     * one face: not for slabs and boxes.  Outside, the depth d is that to which a sphere around a particle gets into
+     * the region.  On the surface, the energy is (k/2) d^2 with the depth d of the sphere beyond the surface, positive
+     * or negative: the particle is held by its radius inside of it.  A Context that has a surface keeps it.
+     *
+     * @param side  "inside", which is what there is without this, "outside" or "surface"
+     */
+    void setSide(const std::string& side);
     /**
      * Get the stiffness k.
      *

@@ -186,7 +186,7 @@ inline DEVICE WallDepth depthBeyond(int shape, int face, GLOBAL const double* RE
 }
 
 /** Find the forces and energies of a wall on particles, with a radius each. */
-KERNEL void computeWalls(int count, int shape, int faces, int includesForces, int paddedNumAtoms,
+KERNEL void computeWalls(int count, int shape, int side, int faces, int includesForces, int paddedNumAtoms,
         GLOBAL mm_ulong* RESTRICT forceBuffers, GLOBAL const int* RESTRICT images, GLOBAL int* RESTRICT marks,
         GLOBAL const double* RESTRICT positions, GLOBAL const int* RESTRICT particles,
         GLOBAL const double* RESTRICT radii, GLOBAL const double* RESTRICT wall, GLOBAL double* RESTRICT energies) {
@@ -197,12 +197,12 @@ KERNEL void computeWalls(int count, int shape, int faces, int includesForces, in
         double energy = 0;
         for (int face = 0; face < faces; face++) {
             const WallDepth found = depthBeyond(shape, face, wall, position);
-            const double depth = found.depth+radii[i];
+            const double sign = side == WALL_OUTSIDE ? -1 : 1, depth = sign*found.depth+radii[i];
             // NaN is taken for a depth, so that forces are NaN.
-            if (depth <= 0)
+            if (depth <= 0 && side != WALL_SURFACE)
                 continue;
             energy += 0.5*stiffness*depth*depth;
-            force = force-found.gradient*(stiffness*depth);
+            force = force-found.gradient*(sign*stiffness*depth);
         }
         energies[i] = energy;
         if (includesForces && energy != 0)

@@ -82,8 +82,9 @@ enum {LINK_FRACTION = 0, LINK_POINT = 2, LINK_STIFFNESS = 8, LINK_REST_LENGTH, L
 /** What is true of links: where nearest images are taken in a periodic box. */
 enum {LINKS_ARE_PERIODIC = 1, PLACES_ARE_PERIODIC = 2};
 
-/** The shapes of walls, in the order of CYLCHAIN_WALL_SHAPES, and the numbers of a wall. */
+/** The shapes of walls and their sides, in the order of Walls.h, and the numbers of a wall. */
 enum {WALL_PLANE, WALL_SLAB, WALL_SPHERE, WALL_CYLINDER, WALL_BOX, WALL_ELLIPSOID, WALL_CAPSULE};
+enum {WALL_INSIDE, WALL_OUTSIDE, WALL_SURFACE};
 enum {WALL_POINT = 0, WALL_VECTOR = 3, WALL_LENGTH = 6, WALL_STIFFNESS, NUM_WALL_NUMBERS};
 
 /**

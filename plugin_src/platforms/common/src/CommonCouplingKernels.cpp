@@ -13,6 +13,8 @@ static_assert((int) WallShape::Plane == layout::WALL_PLANE && (int) WallShape::S
         (int) WallShape::Sphere == layout::WALL_SPHERE && (int) WallShape::Cylinder == layout::WALL_CYLINDER &&
         (int) WallShape::Box == layout::WALL_BOX && (int) WallShape::Ellipsoid == layout::WALL_ELLIPSOID &&
         (int) WallShape::Capsule == layout::WALL_CAPSULE, "");
+static_assert((int) WallSide::Inside == layout::WALL_INSIDE && (int) WallSide::Outside == layout::WALL_OUTSIDE &&
+        (int) WallSide::Surface == layout::WALL_SURFACE, "");
 
 CommonCalcCylinderChainLinkForceKernel::CommonCalcCylinderChainLinkForceKernel(string name, const Platform& platform,
         ComputeContext& cc) : CalcCylinderChainLinkForceKernel(name, platform), cc(cc), coupled(cc), flags(0),
@@ -136,7 +138,7 @@ double CommonCalcCylinderChainWallForceKernel::execute(ContextImpl&, bool includ
     if (!kernel) {
         kernel = coupled.createKernel("computeWalls");
         kernel->addArg((int) walls.particles.size());
-        for (int i = 0; i < 3; i++)
+        for (int i = 0; i < 4; i++)
             kernel->addArg();
         coupled.addArguments(kernel);
         for (ComputeArray* array : {&particles, &radii, &numbers, &energies})
@@ -144,8 +146,9 @@ double CommonCalcCylinderChainWallForceKernel::execute(ContextImpl&, bool includ
     }
     coupled.gather();
     kernel->setArg(1, (int) walls.wall.shape);
-    kernel->setArg(2, countFaces(walls.wall));
-    kernel->setArg(3, (int) includeForces);
+    kernel->setArg(2, (int) walls.wall.side);
+    kernel->setArg(3, countFaces(walls.wall));
+    kernel->setArg(4, (int) includeForces);
     kernel->execute(walls.particles.size());
     if (includeForces)
         coupled.finishForces();

@@ -1,6 +1,7 @@
 #ifndef OPENMM_REFERENCECALCCYLINDERCHAINWALLFORCEKERNEL_H_
 #define OPENMM_REFERENCECALCCYLINDERCHAINWALLFORCEKERNEL_H_
 
+#include "networks/SurfaceEquations.h"
 #include "networks/WallGaps.h"
 #include "openmm/CylinderChainKernels.h"
 #include <vector>
@@ -23,6 +24,7 @@ private:
     cylchain::WallSystem walls;
     std::vector<cylchain::Push>* noted;
     cylchain::WallGaps equations;
+    cylchain::SurfaceEquations surface;
 };
 
 } // namespace OpenMM

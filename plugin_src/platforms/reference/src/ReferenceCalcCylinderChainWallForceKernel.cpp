@@ -38,6 +38,10 @@ void ReferenceCalcCylinderChainWallForceKernel::copyParametersToContext(ContextI
 }
 
 ImplicitCouplings* ReferenceCalcCylinderChainWallForceKernel::getEquations(CouplingImpulses& impulses) {
+    if (walls.wall.side == WallSide::Surface) {
+        surface.setWalls(&walls, &impulses);
+        return &surface;
+    }
     equations.setWalls(&walls, &impulses);
     return &equations;
 }

@@ -30,7 +30,8 @@ public:
     std::vector<std::string> getKernelNames();
     void updateParametersInContext(ContextImpl& context);
     int getOrder() const {
-        return 3;
+        // Those that hold particles on a surface are no gaps.
+        return walls.wall.side == cylchain::WallSide::Surface ? 1 : 3;
     }
     bool hasForces() {
         return !walls.particles.empty() && walls.stiffness != 0;
