@@ -380,7 +380,7 @@ def _step_together(gpu, build, steps, tolerance=1e-7):
         integrator.step(steps)
         contexts.append(context)
     ends = [positions_of(context) for context in contexts]
-    assert np.abs(ends[0] - positions._value).max() > 1.0
+    assert np.abs(ends[0] - positions._value).max() > 1000 * tolerance
     assert np.abs(ends[1] - ends[0]).max() < tolerance
     return filaments, contexts
 
@@ -392,7 +392,7 @@ def test_modes_agree(gpu):
             filaments,
             system,
             positions,
-            filaments.create_integrator(system, 0.05, "modes", checks=False, **arguments),
+            filaments.create_integrator(system, 0.05, "modes", random_seed=4, checks=False, **arguments),
         )
 
     _step_together(gpu, build, 100, TOLERANCES["double"])
@@ -421,22 +421,24 @@ def test_bodies_linkers_and_growing_filaments_agree(gpu):
     def build():
         filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
         actin = F_ACTIN.with_segment_length(108.0)
-        for direction in np.eye(3):
-            growth = Growth(ACTIN_ATP, pool=MonomerPool(unit.Quantity(5e-5, unit.molar)), longest=2000.0)
-            filaments.add_straight(actin, 4, 200.0 * direction, direction, growth=growth)
-        pole = filaments.add_body(Body.sphere(200.0, 200.0 * np.eye(3)), [0, 0, 0])
+        directions = np.eye(3)
+        for direction in directions:
+            filaments.add_straight(actin, 4, 200.0 * direction, direction)
+            growth = Growth(monomers=ACTIN_ATP, pool=MonomerPool(unit.Quantity(5e-5, unit.molar)), longest=2000.0)
+            filaments.add_straight(actin, 4, -300.0 * direction, -direction, growth=growth)
+        pole = filaments.add_body(Body.sphere(200.0, 200.0 * directions), [0, 0, 0])
         hand = Hand(binding_rate=3e-5, reach=50.0, unbinding_rate=1e-6)
         filaments.add_linkers(Crosslinker(hands=hand, stiffness=0.06), count=300, diffusion=1e-3)
         _, system, positions = filaments.build()
         places = filaments.body_indices[pole]
         links = Crosslinks(60.0, 0.0)
-        for nodes, place in zip(filaments.node_indices, places[1:], strict=True):
+        for nodes, place in zip(filaments.node_indices[::2], places[1:], strict=True):
             links.add(None, int(nodes[0]), int(place))
         links.add_to(system)
         system.addForce(filament_wall_force(filaments, system, Sphere((0, 0, 0), 1500.0), 0.1))
         return filaments, system, positions, filaments.create_integrator(system, 1e7, random_seed=2, checks=False)
 
-    filaments, contexts = _step_together(gpu, build, 50)
+    filaments, contexts = _step_together(gpu, build, 20)
     tables = [filaments.in_context(context).linkers() for context in contexts]
     assert tables[0].counts()[1] > 0 and np.array_equal(tables[0].filaments, tables[1].filaments)
 

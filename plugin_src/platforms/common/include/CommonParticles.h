@@ -24,6 +24,7 @@ namespace OpenMM {
 class CommonParticles : public HostParticles {
 public:
     explicit CommonParticles(ComputeContext& cc);
+    void beginSteps();
     ReferenceParallelLoop& getLoop() {
         return loop;
     }

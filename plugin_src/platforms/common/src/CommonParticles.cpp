@@ -78,6 +78,12 @@ template <class T> static void uploadTo(ComputeContext& cc, ComputeArray& array,
 CommonParticles::CommonParticles(ComputeContext& cc) : cc(cc), loop(cc.getThreadPool()) {
 }
 
+void CommonParticles::beginSteps() {
+    cc.initializeContexts();
+    if (cc.getNumContexts() > 1)
+        throw OpenMMException("Filaments are beside one device: give one DeviceIndex alone");
+}
+
 void CommonParticles::include(const vector<int>& present) {
     const size_t before = particles.size();
     isIncluded.resize(cc.getNumAtoms());
@@ -113,9 +119,6 @@ ComputeKernel CommonParticles::createKernel(ComputeProgram program, const string
 void CommonParticles::makeArrays() {
     if (!positions.empty())
         return;
-    cc.initializeContexts();
-    if (cc.getNumContexts() > 1)
-        throw OpenMMException("Filaments are beside one device: give one DeviceIndex alone");
     if (!cc.getSupportsDoublePrecision())
         throw OpenMMException("Filaments need a device that computes in double precision, and this one does not. "
                 "Use the CPU platform, or another device");

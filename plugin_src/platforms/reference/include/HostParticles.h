@@ -20,6 +20,9 @@ class HostParticles {
 public:
     virtual ~HostParticles() {
     }
+    /** Steps are going to be taken, and all Forces have been added to the Context. */
+    virtual void beginSteps() {
+    }
     /** The threads of the processor. */
     virtual ReferenceParallelLoop& getLoop() = 0;
     /** From now on, see and move these, too. */

@@ -37,7 +37,6 @@ const double* ReferenceCalcCylinderChainForceKernel::getBox() const {
 }
 
 ChainEnergy ReferenceCalcCylinderChainForceKernel::addForces(vector<Vec3>& forces, bool includeEnergy) {
-    particles->update();
     const double* positions = &particles->getPositions()[0][0];
     const double* box = getBox();
     const int numPacks = engine->getNumPacks();
@@ -59,6 +58,7 @@ ChainEnergy ReferenceCalcCylinderChainForceKernel::addForces(vector<Vec3>& force
 }
 
 double ReferenceCalcCylinderChainForceKernel::execute(ContextImpl& context, bool includeForces, bool includeEnergy) {
+    particles->update();
     vector<Vec3> unused;
     if (!includeForces)
         unused.resize(context.getSystem().getNumParticles());
@@ -69,6 +69,7 @@ double ReferenceCalcCylinderChainForceKernel::execute(ContextImpl& context, bool
 }
 
 void ReferenceCalcCylinderChainForceKernel::computeEnergies(ContextImpl& context, double& stretching, double& bending) {
+    particles->update();
     vector<Vec3> unused(context.getSystem().getNumParticles());
     const ChainEnergy energy = addForces(unused, true);
     stretching = energy.stretching;

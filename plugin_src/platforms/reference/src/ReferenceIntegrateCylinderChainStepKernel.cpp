@@ -29,6 +29,7 @@ void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system,
 
     chainKernel = &dynamic_cast<ReferenceCalcCylinderChainForceKernel&>(forceKernel);
     this->others = &others;
+    particles->beginSteps();
     mixedChains = 0;
     displacements.assign(system.getNumParticles(), Vec3());
     newPositions.assign(system.getNumParticles(), Vec3());
