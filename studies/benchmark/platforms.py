@@ -141,7 +141,7 @@ def mixed_system(particles, chains):
     )
     layers, rows = -(-particles // columns**2), -(-chains // columns)
     topology, system = app.Topology(), openmm.System()
-    system.setDefaultPeriodicBoxVectors(*(SPACING * np.diag([columns, columns, max(9, layers + rows)])))
+    system.setDefaultPeriodicBoxVectors(*(SPACING * np.diag([columns, columns, max(11, layers + rows)])))
     topology.setPeriodicBoxVectors(system.getDefaultPeriodicBoxVectors())
     chain = topology.addChain()
     for _ in range(particles):
