@@ -39,7 +39,7 @@ MIXED_TIME_STEP = 2.0e5
 """In ps: particles diffuse by 1 % of their diameter in it."""
 
 LINK_STIFFNESS = 0.06
-CONTACT_STIFFNESS = 0.006
+CONTACT_STIFFNESS = 0.06
 """In kJ/(mol nm^2), of what joins filaments and of their contacts."""
 
 ADDED_FILAMENTS = 10
