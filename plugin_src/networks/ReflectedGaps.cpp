@@ -211,14 +211,15 @@ void ReflectedGaps::move(int i, double push, bool opens) {
  * Go through the gaps of a part in turn, forwards and backwards, until no force changes: those that are pushed, and now
  * and then all.
  */
-void ReflectedGaps::findPushesOfPart(int part) {
+void ReflectedGaps::findPushesOfPart(int part, const Loop& loop) {
     const int count = gaps.size();
     motions.assign(responses.countPorts()+1, MotionOfPort());
-    for (int i = 0; i < count; i++) {
+    all.visit(false, loop, [&] (int i) {
         inPart[i].push = inPart[i].response > 0 ? pushes[(size_t) i*parts+part] : 0;
         if (inPart[i].push != 0)
             move(i, inPart[i].push, inPart[i].isReflected);
-    }
+        return 0.0;
+    });
     // The change of a gap, over what it may be.
     auto update = [&] (int i) {
         GapInPart& gap = inPart[i];
@@ -232,22 +233,18 @@ void ReflectedGaps::findPushesOfPart(int part) {
     };
     bool converged = false;
     for (int sweeps = 0; sweeps < MOST_SWEEPS; sweeps++) {
-        double largest = 0;
-        pushed.clear();
-        for (int i = 0; i < count; i++)
-            if (inPart[i].response > 0) {
-                largest = max(largest, update(i));
-                if (inPart[i].push != 0)
-                    pushed.push_back(i);
-            }
+        double largest = all.visit(false, loop, [&] (int i) {
+            return inPart[i].response > 0 ? update(i) : 0.0;
+        });
+        pushed.select(all, [&] (int i) {
+            return inPart[i].push != 0;
+        });
         if (largest == 0 || (converged && largest <= 1))
             break;
         converged = false;
         for (int i = 0; i < SWEEPS_OF_PUSHED && !converged && ++sweeps < MOST_SWEEPS; i++) {
             const double before = largest;
-            largest = 0;
-            for (size_t k = 0; k < pushed.size(); k++)
-                largest = max(largest, update(pushed[sweeps%2 == 0 ? k : pushed.size()-1-k]));
+            largest = pushed.visit(sweeps%2 != 0, loop, update);
             // All that is left to change, if each sweep changes as much less than the one before.
             const double rate = min(largest/before, LARGEST_RATE);
             converged = largest*rate <= 1-rate;
@@ -258,11 +255,12 @@ void ReflectedGaps::findPushesOfPart(int part) {
 }
 
 /** Find the forces of all gaps from their starts, and their ends without forces. */
-void ReflectedGaps::findPushes() {
+void ReflectedGaps::findPushes(const Loop& loop) {
     const int count = gaps.size(), none = responses.countPorts();
     inPart.resize(count);
     forces.assign(count, 0.0);
-    for (int i = 0; i < count; i++) {
+    all.sort(count, responses);
+    runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
         GapInPart& gap = inPart[i];
         predicted[i] = gaps[i].start;
         gap.isReflected = gaps[i].law == GapLaw::Reflection;
@@ -271,22 +269,22 @@ void ReflectedGaps::findPushes() {
         gap.tolerance = OF_SWEEPS*scaleOf(i)+0.1*LEAST_CHANGE_OF_GAPS;
         for (int side = 0; side < 2; side++)
             gap.ports[side] = responses.getPort(i, side) >= 0 ? responses.getPort(i, side) : none;
-    }
+    });
     for (int part = 0; part < parts; part++) {
-        for (int i = 0; i < count; i++) {
+        runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
             GapInPart& gap = inPart[i];
             gap.start = predicted[i];
             gap.end = gap.start+(free[i]-gaps[i].start)/parts+bridges[(size_t) i*parts+part];
             gap.variate = kT/parts*reflections[(size_t) i*parts+part];
-        }
-        findPushesOfPart(part);
-        for (int i = 0; i < count; i++) {
+        });
+        findPushesOfPart(part, loop);
+        runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
             const GapInPart& gap = inPart[i];
             forces[i] += gap.push;
             predicted[i] = gap.end+motions[gap.ports[0]].all+motions[gap.ports[1]].all;
             if (gap.isReflected && part < parts-1)
                 predicted[i] = max(predicted[i], 0.0);
-        }
+        });
     }
 }
 
@@ -322,7 +320,7 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
     corrections.resize(count, 0.0);
     for (size_t i = 0; i < count; i++)
         free[i] = gaps[i].end+endMove(i, coupled.getMoves())+corrections[i];
-    findPushes();
+    findPushes(loop);
     vector<double> loads(3*(firstEquations[count]-first));
     for (size_t i = 0; i < count; i++)
         for (int lever = 0; lever < gaps[i].numLevers; lever++)
