@@ -3,7 +3,7 @@
 
 #include "networks/CoupledEquations.h"
 #include "networks/Gap.h"
-#include "networks/GapLevels.h"
+#include "networks/GapColors.h"
 #include "networks/GapResponses.h"
 #include <cstddef>
 #include <vector>
@@ -105,7 +105,7 @@ private:
     };
     std::vector<GapInPart> inPart;
     /** All gaps, and those that are pushed in a part. */
-    GapLevels all, pushed;
+    GapColors all, pushed;
     /** How far forces move a port in a part, and those that open its gap alone. */
     struct MotionOfPort {
         double all = 0, opening = 0;

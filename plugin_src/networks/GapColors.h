@@ -1,29 +1,29 @@
-#ifndef CYLCHAIN_GAP_LEVELS_H_
-#define CYLCHAIN_GAP_LEVELS_H_
+#ifndef CYLCHAIN_GAP_COLORS_H_
+#define CYLCHAIN_GAP_COLORS_H_
 
 #include "mechanics/Loop.h"
 #include "networks/GapResponses.h"
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace cylchain {
 
 /**
- * Gaps in levels, so that threads go through them and find what one thread would find that goes through them in turn.
- *
- * Gaps of one level share no chain, and all gaps before them with which they share one are in lower levels.
+ * An order of gaps in which threads can go through them together and find what one thread would find: gaps of a color
+ * share no chain, and colors follow each other.
  */
-class GapLevels {
+class GapColors {
 public:
-    /** Sort all gaps. */
+    /** Give each gap the first color that none of those before it on its chains has, and sort them by these. */
     void sort(int count, const GapResponses& responses);
-    /** Take those of other levels for which a function says so. */
-    template <class Function> void select(const GapLevels& all, Function isOne) {
+    /** Take those of another order for which a function says so. */
+    template <class Function> void select(const GapColors& all, Function isOne) {
         gaps.clear();
         firsts.assign(1, 0);
-        for (std::size_t level = 0; level+1 < all.firsts.size(); level++) {
-            for (int k = all.firsts[level]; k < all.firsts[level+1]; k++)
+        for (std::size_t color = 0; color+1 < all.firsts.size(); color++) {
+            for (int k = all.firsts[color]; k < all.firsts[color+1]; k++)
                 if (isOne(all.gaps[k]))
                     gaps.push_back(all.gaps[k]);
             if ((int) gaps.size() > firsts.back())
@@ -37,10 +37,10 @@ public:
      */
     template <class Function> double visit(bool backwards, const Loop& loop, Function function) {
         double largest = 0;
-        const int numLevels = firsts.size()-1;
-        for (int i = 0; i < numLevels; i++) {
-            const int level = backwards ? numLevels-1-i : i;
-            const int first = firsts[level], last = firsts[level+1], chunks = (last-first+CHUNK-1)/CHUNK;
+        const int numColors = firsts.size()-1;
+        for (int i = 0; i < numColors; i++) {
+            const int color = backwards ? numColors-1-i : i;
+            const int first = firsts[color], last = firsts[color+1], chunks = (last-first+CHUNK-1)/CHUNK;
             auto visitChunk = [&] (int chunk) {
                 double found = 0;
                 for (int k = first+chunk*CHUNK; k < std::min(last, first+(chunk+1)*CHUNK); k++)
@@ -61,13 +61,15 @@ public:
     }
 private:
     /** Gaps that a thread goes through, which takes about as long as to wake it up. */
-    static constexpr int CHUNK = 96;
-    /** Sorted by levels; where each begins, and one behind the last. */
+    static constexpr int CHUNK = 64;
+    /** Sorted by their colors; where each of these begins, and one behind the last. */
     std::vector<int> gaps, firsts = std::vector<int>(1, 0);
-    std::vector<int> levelOf, levelOfChain;
+    std::vector<int> colorOf;
+    /** For each chain, which colors gaps on it have, 64 to a word. */
+    std::vector<std::uint64_t> used;
     std::vector<double> largestOfChunks;
 };
 
 } // namespace cylchain
 
-#endif /*CYLCHAIN_GAP_LEVELS_H_*/
+#endif /*CYLCHAIN_GAP_COLORS_H_*/
