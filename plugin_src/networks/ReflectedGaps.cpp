@@ -125,12 +125,12 @@ void ReflectedGaps::drawNumbers(const Loop& loop) {
 }
 
 /** Give numbers of ports the covariance of the responses, and sum them for each gap. */
-void ReflectedGaps::correlate(const vector<double>& normals, vector<double>& sums) const {
-    sums.assign(gaps.size()*parts, 0.0);
-    for (int number : responses.getChains()) {
-        const GapResponses::ChainPorts& chain = responses.getPorts(number);
-        for (int row = 0; row < chain.count(); row++) {
-            double* const sum = &sums[(size_t) chain.ports[row].gap*parts];
+void ReflectedGaps::correlate(const vector<double>& normals, vector<double>& sums, const Loop& loop) const {
+    sums.resize(gaps.size()*parts);
+    runInChunks(loop, gaps.size(), CHUNK_OF_GAPS, [&] (int gap) {
+        double* const sum = &sums[(size_t) gap*parts];
+        fill_n(sum, parts, 0.0);
+        responses.forPorts(gap, [&] (const GapResponses::ChainPorts& chain, int row) {
             const double* const root = chain.rootOf(row);
             for (int column = 0; column <= row; column++) {
                 const GapResponses::Port& port = chain.ports[column];
@@ -138,20 +138,20 @@ void ReflectedGaps::correlate(const vector<double>& normals, vector<double>& sum
                 for (int part = 0; part < parts; part++)
                     sum[part] += root[column]*own[part];
             }
-        }
-    }
+        });
+    });
 }
 
 /**
  * Find bridges of Brownian motion, and exponential variates, that are correlated as the gaps move: those that move as
  * one are reflected as one.
  */
-void ReflectedGaps::findNoise() {
-    correlate(ofBridges, bridges);
-    correlate(ofReflections, reflections);
+void ReflectedGaps::findNoise(const Loop& loop) {
+    correlate(ofBridges, bridges, loop);
+    correlate(ofReflections, reflections, loop);
     const double size = sqrt(2*kT/parts);
-    for (size_t i = 0; i < gaps.size(); i++) {
-        double *const bridge = &bridges[i*parts], *const reflection = &reflections[i*parts];
+    runInChunks(loop, gaps.size(), CHUNK_OF_GAPS, [&] (int i) {
+        double *const bridge = &bridges[(size_t) i*parts], *const reflection = &reflections[(size_t) i*parts];
         const double mean = accumulate(bridge, bridge+parts, 0.0)/parts;
         const double ofChains = responses.getOfChains(i);
         const double ofGap = ofChains > 0 ? size*sqrt(responses.getOwn(i)/ofChains) : 0;
@@ -160,7 +160,7 @@ void ReflectedGaps::findNoise() {
             bridge[part] = (bridge[part]-mean)*ofGap;
             reflection[part] = -log(max(LEAST_CHANCE, 0.5*erfc(reflection[part]*perSize)));
         }
-    }
+    });
 }
 
 /** How far a gap moves without being noticed: thermally behind its surface, or in the step. */
@@ -308,7 +308,7 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
         parts = needed;
         pushes.resize(count*parts, 0.0);
         drawNumbers(loop);
-        findNoise();
+        findNoise(loop);
     }
     auto endMove = [&] (size_t i, const vector<double>& moves) {
         double sum = 0;
@@ -318,8 +318,9 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
     };
     coupled.predictMoves(packs, first, loop);
     corrections.resize(count, 0.0);
-    for (size_t i = 0; i < count; i++)
+    runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
         free[i] = gaps[i].end+endMove(i, coupled.getMoves())+corrections[i];
+    });
     findPushes(loop);
     vector<double> loads(3*(firstEquations[count]-first));
     for (size_t i = 0; i < count; i++)
@@ -329,10 +330,12 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
     coupled.push(packs, first, loads, demands, loop);
     changes.resize(count, 0.0);
     motions.assign(responses.countPorts()+1, MotionOfPort());
-    for (size_t i = 0; i < count; i++)
+    all.visit(false, loop, [&] (int i) {
         if (forces[i] != 0)
             move(i, forces[i], false);
-    for (size_t i = 0; i < count; i++) {
+        return 0.0;
+    });
+    runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
         const double pushed = endMove(i, coupled.getPushedMoves());
         predicted[i] = free[i]-corrections[i]+pushed;
         // Responses may be those of an iteration before, and others push through links.
@@ -341,7 +344,7 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
         const bool isBack = coupled.joinsPlaces() && change*changes[i] < 0;
         corrections[i] += isBack ? DAMPING_OF_GAPS*change : change;
         changes[i] = change;
-    }
+    });
 }
 
 /** Whether a gap that no iteration knows of yet may be pushed. */

@@ -70,8 +70,8 @@ public:
 private:
     int chooseParts() const;
     void drawNumbers(const Loop& loop);
-    void correlate(const std::vector<double>& normals, std::vector<double>& sums) const;
-    void findNoise();
+    void correlate(const std::vector<double>& normals, std::vector<double>& sums, const Loop& loop) const;
+    void findNoise(const Loop& loop);
     void findPushes(const Loop& loop);
     void findPushesOfPart(int part, const Loop& loop);
     double findPush(int gap, int part) const;
