@@ -126,7 +126,7 @@ def wall_forces(context: openmm.Context) -> list[WallForces]:
     at the recommended step, and right in short ones alone: the difference of both is right, and so are overlaps.
 
     Where nothing is summed up, forces are those at the present positions, with a duration of 0: of walls of
-    ``wall_force``, in other Integrators, on platforms for GPUs, and as long as no step was taken.
+    ``wall_force``, in other Integrators, and as long as no step was taken.
 
     Parameters
     ----------

@@ -331,10 +331,9 @@ class Filaments(TiedFilaments):
             statistical error: for open filaments with harmonic lengths and an implicit scheme of the compiled engine,
             above zero temperature, without flow, while 4 h K/gamma_rot is at most 10^4, k l0^2/k_BT at most 10^9, and
             noise changes lengths by 10^-5 of themselves in a step, or more.
-            Positions and forces are in double precision, and other filaments altogether; so are those of beam elements,
-            and all on platforms for GPUs, where "mixed" is refused before the first step. "automatic" does so where it
-            is faster as well, about twice as fast: where there are enough filaments of similar length, or few that are
-            long. With the portable engine it is the same as "double".
+            Positions and forces are in double precision, and other filaments altogether; so are those of beam elements.
+            "automatic" does so where it is faster as well, about twice as fast: where there are enough filaments of
+            similar length, or few that are long. With the portable engine it is the same as "double".
             ``integrator.getNumMixedPrecisionChains()`` says for how many filaments the last step did so.
 
         Returns

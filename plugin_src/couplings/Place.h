@@ -3,6 +3,8 @@
 
 #include "mechanics/BezierWeights.h"
 #include "mechanics/PeriodicBox.h"
+#include <initializer_list>
+#include <vector>
 
 namespace cylchain {
 
@@ -40,6 +42,13 @@ struct Place {
         return tangent != 0;
     }
 };
+
+/** Add the numbers of the particles that say where a place is. */
+inline void addParticles(const Place& place, std::vector<int>& particles) {
+    for (int particle : {place.first, place.second, place.controls[0], place.controls[1]})
+        if (particle >= 0)
+            particles.push_back(particle);
+}
 
 /** Whether two places are one, wherever particles are, but for rounding of their fractions. */
 bool areSame(const Place& a, const Place& b);

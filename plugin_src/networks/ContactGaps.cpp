@@ -406,21 +406,21 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
     selectNear(firstNew);
     runInChunks(*loop, near.size(), CHUNK_OF_CAPSULES, [&] (int i) {
         follow(near[i]);
+        if (near[i].number < 0)
+            return;
+        if (near[i].hasMoved)
+            gaps.get(near[i].number) = near[i].gap;
+        else
+            gaps.get(near[i].number).end = near[i].gap.end;
     });
     vector<const NearPair*> deep;
     for (const NearPair& own : near)
         if (own.touchedAtStart && own.gap.law == GapLaw::Spring)
             deep.push_back(&own);
     for (NearPair& own : near)
-        if (own.number < 0) {
-            if (own.hasMoved && own.gap.numLevers > 0 && own.gap.present && mayClose(own.gap) &&
-                    !isOfNeighbor(own, deep))
-                own.number = gaps.add(own.gap);
-        }
-        else if (own.hasMoved)
-            gaps.get(own.number) = own.gap;
-        else
-            gaps.get(own.number).end = own.gap.end;
+        if (own.number < 0 && own.hasMoved && own.gap.numLevers > 0 && own.gap.present && mayClose(own.gap) &&
+                !isOfNeighbor(own, deep))
+            own.number = gaps.add(own.gap);
     return motion.exceedsReach() && !settled;
 }
 

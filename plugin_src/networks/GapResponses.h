@@ -71,6 +71,12 @@ public:
     const std::vector<int>& getChains() const {
         return used;
     }
+    int getNumChains() const {
+        return chains.size();
+    }
+    int numberOf(const ChainPorts& chain) const {
+        return &chain-chains.data();
+    }
     const ChainPorts& getPorts(int chain) const {
         return chains[chain];
     }

@@ -125,12 +125,12 @@ void ReflectedGaps::drawNumbers(const Loop& loop) {
 }
 
 /** Give numbers of ports the covariance of the responses, and sum them for each gap. */
-void ReflectedGaps::correlate(const vector<double>& normals, vector<double>& sums) const {
-    sums.assign(gaps.size()*parts, 0.0);
-    for (int number : responses.getChains()) {
-        const GapResponses::ChainPorts& chain = responses.getPorts(number);
-        for (int row = 0; row < chain.count(); row++) {
-            double* const sum = &sums[(size_t) chain.ports[row].gap*parts];
+void ReflectedGaps::correlate(const vector<double>& normals, vector<double>& sums, const Loop& loop) const {
+    sums.resize(gaps.size()*parts);
+    runInChunks(loop, gaps.size(), CHUNK_OF_GAPS, [&] (int gap) {
+        double* const sum = &sums[(size_t) gap*parts];
+        fill_n(sum, parts, 0.0);
+        responses.forPorts(gap, [&] (const GapResponses::ChainPorts& chain, int row) {
             const double* const root = chain.rootOf(row);
             for (int column = 0; column <= row; column++) {
                 const GapResponses::Port& port = chain.ports[column];
@@ -138,20 +138,20 @@ void ReflectedGaps::correlate(const vector<double>& normals, vector<double>& sum
                 for (int part = 0; part < parts; part++)
                     sum[part] += root[column]*own[part];
             }
-        }
-    }
+        });
+    });
 }
 
 /**
  * Find bridges of Brownian motion, and exponential variates, that are correlated as the gaps move: those that move as
  * one are reflected as one.
  */
-void ReflectedGaps::findNoise() {
-    correlate(ofBridges, bridges);
-    correlate(ofReflections, reflections);
+void ReflectedGaps::findNoise(const Loop& loop) {
+    correlate(ofBridges, bridges, loop);
+    correlate(ofReflections, reflections, loop);
     const double size = sqrt(2*kT/parts);
-    for (size_t i = 0; i < gaps.size(); i++) {
-        double *const bridge = &bridges[i*parts], *const reflection = &reflections[i*parts];
+    runInChunks(loop, gaps.size(), CHUNK_OF_GAPS, [&] (int i) {
+        double *const bridge = &bridges[(size_t) i*parts], *const reflection = &reflections[(size_t) i*parts];
         const double mean = accumulate(bridge, bridge+parts, 0.0)/parts;
         const double ofChains = responses.getOfChains(i);
         const double ofGap = ofChains > 0 ? size*sqrt(responses.getOwn(i)/ofChains) : 0;
@@ -160,7 +160,7 @@ void ReflectedGaps::findNoise() {
             bridge[part] = (bridge[part]-mean)*ofGap;
             reflection[part] = -log(max(LEAST_CHANCE, 0.5*erfc(reflection[part]*perSize)));
         }
-    }
+    });
 }
 
 /** How far a gap moves without being noticed: thermally behind its surface, or in the step. */
@@ -211,14 +211,15 @@ void ReflectedGaps::move(int i, double push, bool opens) {
  * Go through the gaps of a part in turn, forwards and backwards, until no force changes: those that are pushed, and now
  * and then all.
  */
-void ReflectedGaps::findPushesOfPart(int part) {
+void ReflectedGaps::findPushesOfPart(int part, const Loop& loop) {
     const int count = gaps.size();
     motions.assign(responses.countPorts()+1, MotionOfPort());
-    for (int i = 0; i < count; i++) {
+    all.visit(false, loop, [&] (int i) {
         inPart[i].push = inPart[i].response > 0 ? pushes[(size_t) i*parts+part] : 0;
         if (inPart[i].push != 0)
             move(i, inPart[i].push, inPart[i].isReflected);
-    }
+        return 0.0;
+    });
     // The change of a gap, over what it may be.
     auto update = [&] (int i) {
         GapInPart& gap = inPart[i];
@@ -232,22 +233,18 @@ void ReflectedGaps::findPushesOfPart(int part) {
     };
     bool converged = false;
     for (int sweeps = 0; sweeps < MOST_SWEEPS; sweeps++) {
-        double largest = 0;
-        pushed.clear();
-        for (int i = 0; i < count; i++)
-            if (inPart[i].response > 0) {
-                largest = max(largest, update(i));
-                if (inPart[i].push != 0)
-                    pushed.push_back(i);
-            }
+        double largest = all.visit(false, loop, [&] (int i) {
+            return inPart[i].response > 0 ? update(i) : 0.0;
+        });
+        pushed.select(all, [&] (int i) {
+            return inPart[i].push != 0;
+        });
         if (largest == 0 || (converged && largest <= 1))
             break;
         converged = false;
         for (int i = 0; i < SWEEPS_OF_PUSHED && !converged && ++sweeps < MOST_SWEEPS; i++) {
             const double before = largest;
-            largest = 0;
-            for (size_t k = 0; k < pushed.size(); k++)
-                largest = max(largest, update(pushed[sweeps%2 == 0 ? k : pushed.size()-1-k]));
+            largest = pushed.visit(sweeps%2 != 0, loop, update);
             // All that is left to change, if each sweep changes as much less than the one before.
             const double rate = min(largest/before, LARGEST_RATE);
             converged = largest*rate <= 1-rate;
@@ -258,11 +255,12 @@ void ReflectedGaps::findPushesOfPart(int part) {
 }
 
 /** Find the forces of all gaps from their starts, and their ends without forces. */
-void ReflectedGaps::findPushes() {
+void ReflectedGaps::findPushes(const Loop& loop) {
     const int count = gaps.size(), none = responses.countPorts();
     inPart.resize(count);
     forces.assign(count, 0.0);
-    for (int i = 0; i < count; i++) {
+    all.sort(count, responses);
+    runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
         GapInPart& gap = inPart[i];
         predicted[i] = gaps[i].start;
         gap.isReflected = gaps[i].law == GapLaw::Reflection;
@@ -271,22 +269,22 @@ void ReflectedGaps::findPushes() {
         gap.tolerance = OF_SWEEPS*scaleOf(i)+0.1*LEAST_CHANGE_OF_GAPS;
         for (int side = 0; side < 2; side++)
             gap.ports[side] = responses.getPort(i, side) >= 0 ? responses.getPort(i, side) : none;
-    }
+    });
     for (int part = 0; part < parts; part++) {
-        for (int i = 0; i < count; i++) {
+        runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
             GapInPart& gap = inPart[i];
             gap.start = predicted[i];
             gap.end = gap.start+(free[i]-gaps[i].start)/parts+bridges[(size_t) i*parts+part];
             gap.variate = kT/parts*reflections[(size_t) i*parts+part];
-        }
-        findPushesOfPart(part);
-        for (int i = 0; i < count; i++) {
+        });
+        findPushesOfPart(part, loop);
+        runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
             const GapInPart& gap = inPart[i];
             forces[i] += gap.push;
             predicted[i] = gap.end+motions[gap.ports[0]].all+motions[gap.ports[1]].all;
             if (gap.isReflected && part < parts-1)
                 predicted[i] = max(predicted[i], 0.0);
-        }
+        });
     }
 }
 
@@ -310,7 +308,7 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
         parts = needed;
         pushes.resize(count*parts, 0.0);
         drawNumbers(loop);
-        findNoise();
+        findNoise(loop);
     }
     auto endMove = [&] (size_t i, const vector<double>& moves) {
         double sum = 0;
@@ -320,9 +318,10 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
     };
     coupled.predictMoves(packs, first, loop);
     corrections.resize(count, 0.0);
-    for (size_t i = 0; i < count; i++)
+    runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
         free[i] = gaps[i].end+endMove(i, coupled.getMoves())+corrections[i];
-    findPushes();
+    });
+    findPushes(loop);
     vector<double> loads(3*(firstEquations[count]-first));
     for (size_t i = 0; i < count; i++)
         for (int lever = 0; lever < gaps[i].numLevers; lever++)
@@ -331,10 +330,12 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
     coupled.push(packs, first, loads, demands, loop);
     changes.resize(count, 0.0);
     motions.assign(responses.countPorts()+1, MotionOfPort());
-    for (size_t i = 0; i < count; i++)
+    all.visit(false, loop, [&] (int i) {
         if (forces[i] != 0)
             move(i, forces[i], false);
-    for (size_t i = 0; i < count; i++) {
+        return 0.0;
+    });
+    runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
         const double pushed = endMove(i, coupled.getPushedMoves());
         predicted[i] = free[i]-corrections[i]+pushed;
         // Responses may be those of an iteration before, and others push through links.
@@ -343,7 +344,7 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
         const bool isBack = coupled.joinsPlaces() && change*changes[i] < 0;
         corrections[i] += isBack ? DAMPING_OF_GAPS*change : change;
         changes[i] = change;
-    }
+    });
 }
 
 /** Whether a gap that no iteration knows of yet may be pushed. */

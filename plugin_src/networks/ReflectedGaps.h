@@ -3,6 +3,7 @@
 
 #include "networks/CoupledEquations.h"
 #include "networks/Gap.h"
+#include "networks/GapColors.h"
 #include "networks/GapResponses.h"
 #include <cstddef>
 #include <vector>
@@ -28,7 +29,8 @@ namespace cylchain {
  * move on by a share of b-a and by a bridge of Brownian motion with the covariance 2 k_B T G, and every gap takes the
  * law of one, with what others push in this part whole at its end and, where it opens the gap, by a third at its start.
  * Gaps that move together have variates E that are correlated as their motion is: those that move as one are reflected
- * as one. With one gap on each chain, all this is exact. Going through the gaps in turn finds the forces of a part.
+ * as one. With one gap on each chain, all this is exact. Going through the gaps in turn finds the forces of a part;
+ * threads do so at once with gaps that share no chain.
  *
  * Soft surfaces are hard ones at random depths: see placeHardSurface().
  */
@@ -68,10 +70,10 @@ public:
 private:
     int chooseParts() const;
     void drawNumbers(const Loop& loop);
-    void correlate(const std::vector<double>& normals, std::vector<double>& sums) const;
-    void findNoise();
-    void findPushes();
-    void findPushesOfPart(int part);
+    void correlate(const std::vector<double>& normals, std::vector<double>& sums, const Loop& loop) const;
+    void findNoise(const Loop& loop);
+    void findPushes(const Loop& loop);
+    void findPushesOfPart(int part, const Loop& loop);
     double findPush(int gap, int part) const;
     double findPushOfSpring(int gap, int part, double end) const;
     void move(int gap, double push, bool opens);
@@ -102,8 +104,8 @@ private:
         bool isReflected;
     };
     std::vector<GapInPart> inPart;
-    /** The gaps that are pushed in a part. */
-    std::vector<int> pushed;
+    /** All gaps, and those that are pushed in a part. */
+    GapColors all, pushed;
     /** How far forces move a port in a part, and those that open its gap alone. */
     struct MotionOfPort {
         double all = 0, opening = 0;

@@ -2,8 +2,7 @@
 # OpenMM's library of the platform, with its headers, and the headers of what it runs on. What they lack is said in
 # platforms.txt, which is installed, and never stops the build.
 
-set(COMMON_KERNELS layout constants vectors noise potentials workspace workItems stages tensionBand equations metricForces
-    solverOfItem solverOfGroup implicitStep explicitStep chainForces chainKernels particles couplings contacts)
+set(COMMON_KERNELS layout noise particles)
 list(TRANSFORM COMMON_KERNELS PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/platforms/common/kernels/")
 list(TRANSFORM COMMON_KERNELS APPEND ".cc")
 set(KERNEL_SOURCES "${CMAKE_CURRENT_BINARY_DIR}/CommonCylinderChainKernelSources.cpp")
@@ -22,7 +21,8 @@ set(PLATFORMS_TEXT "")
 function(add_gpu_plugin name folder library)
     file(GLOB sources CONFIGURE_DEPENDS platforms/common/src/*.cpp platforms/${folder}/src/*.cpp)
     add_library(OpenMMCylinderChain${name} SHARED ${sources} "${KERNEL_SOURCES}")
-    target_include_directories(OpenMMCylinderChain${name} PRIVATE platforms/common/include platforms/${folder}/include)
+    target_include_directories(OpenMMCylinderChain${name} PRIVATE
+        platforms/common/include platforms/reference/include platforms/${folder}/include)
     target_include_directories(OpenMMCylinderChain${name} SYSTEM PRIVATE ${ARGN})
     target_link_libraries(OpenMMCylinderChain${name} PRIVATE OpenMMCylinderChain OpenMMCylinderChainReference
         CylinderChainMechanics "${library}")

@@ -54,9 +54,8 @@ def test_mixed_system_is_what_it_says():
 
 def test_sizes_are_those_that_the_page_names():
     names = [size.name for size in platforms.FULL.sizes]
-    assert names[:2] == ["200_chains_of_64", "2000_chains_of_64"]
-    assert len(names) == 7
-    assert names[-1] == "100000_particles_and_1000_filaments"
+    assert names[:2] == ["200_chains_of_64", "200_chains_of_10"]
+    assert names[-1] == "100000_particles_and_100_filaments"
 
 
 def test_rows_are_ratios_to_the_cpu():

@@ -8,11 +8,16 @@ import pytest
 from openmm import app, unit
 
 from openmm_cylchain import (
+    ACTIN_ATP,
+    F_ACTIN,
+    Body,
     Crosslinker,
     Crosslinks,
     Filaments,
+    Growth,
     Hand,
     InstabilityError,
+    MonomerPool,
     Sphere,
     capsule_contact_force,
     filament_wall_force,
@@ -21,7 +26,7 @@ from openmm_cylchain import (
 from support.contexts import energy_of, forces_of, new_context, positions_of
 from support.mixed_systems import mixed_context
 from support.platform_variants import ACTIN, SHEAR, VARIANTS, filaments_of_variant, step_of_variant
-from support.platforms import GPU_CASES, GPU_NAMES, NOT_TESTED, WORK_ITEMS
+from support.platforms import GPU_CASES, GPU_NAMES, NOT_TESTED
 from support.solvent import TEMPERATURE, VISCOSITY
 
 # Of paths, in nm. Pushes of 0.3 kJ/(mol nm) take filaments 1000 nm far here.
@@ -31,23 +36,6 @@ TOLERANCES = {case.precision: case.path_tolerance for case in GPU_CASES}
 EXACT_TOLERANCES = {"double": 1e-9, "mixed": 1e-6, "single": 5e-3}
 
 pytestmark = pytest.mark.skipif(not GPU_NAMES, reason=str(NOT_TESTED))
-
-
-@pytest.fixture(params=WORK_ITEMS)
-def work_items(request, monkeypatch):
-    """How many work-items take the implicit steps of a filament."""
-    monkeypatch.setenv("CYLCHAIN_WORK_ITEMS", str(request.param))
-    return request.param
-
-
-EITHER_WAY = pytest.mark.parametrize("work_items", WORK_ITEMS, indirect=True)
-"""Runs a test with one work-item for a filament, and with several."""
-
-# PoCL compiles the kernels of several for half a minute in each precision.
-EITHER_WAY_IF_SLOW = pytest.mark.parametrize(
-    "work_items", [1, *(pytest.param(items, marks=pytest.mark.slow) for items in WORK_ITEMS[1:])], indirect=True
-)
-"""The same, with several where slow tests run."""
 
 
 def _context(variant, scheme, platform, precision=None, flow=None, pushed=True):
@@ -73,25 +61,16 @@ def _compare(gpu, variant, scheme, precision, steps=20, flow=None, tolerances=TO
     assert np.abs(positions_of(found) - end).max() < tolerances[precision]
 
 
-@pytest.mark.parametrize(
-    ("precision", "work_items"),
-    [
-        *((precision, 1) for precision in TOLERANCES),
-        ("double", 32),
-        *(pytest.param(precision, 32, marks=pytest.mark.slow) for precision in ("mixed", "single")),
-    ],
-    indirect=["work_items"],
-)
-def test_trajectories_with_noise_agree(gpu, precision, work_items):
+@pytest.mark.parametrize("precision", TOLERANCES)
+def test_trajectories_with_noise_agree(gpu, precision):
     """100 steps of open filaments among beads, in each precision."""
     _compare(gpu, "open", "implicit", precision, steps=100, tolerances=EXACT_TOLERANCES)
 
 
 @pytest.mark.slow
-@EITHER_WAY
 @pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order"])
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_all_variants_agree_at_implicit_steps(gpu, work_items, variant, scheme):
+def test_all_variants_agree_at_implicit_steps(gpu, variant, scheme):
     _compare(gpu, variant, scheme, "double")
 
 
@@ -102,10 +81,9 @@ def test_all_variants_agree_at_explicit_steps(gpu, variant, scheme):
     _compare(gpu, variant, scheme, "double")
 
 
-@EITHER_WAY
 @pytest.mark.slow
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_without_forces_of_openmm_they_agree_to_rounding(gpu, work_items, variant):
+def test_without_forces_of_openmm_they_agree_to_rounding(gpu, variant):
     """A hundred steps with noise. What OpenMM computes itself is added in units of 2^-32 kJ/(mol nm) there."""
     contexts = [
         _context(variant, "implicit", platform, precision, pushed=False)
@@ -119,70 +97,11 @@ def test_without_forces_of_openmm_they_agree_to_rounding(gpu, work_items, varian
     assert np.abs(found - expected).max() < 1e-10
 
 
-@EITHER_WAY
 @pytest.mark.slow
 @pytest.mark.parametrize("variant", ["open", "fixed", "ring", "planar", "beads"])
-def test_filaments_in_a_flow_agree(gpu, work_items, variant):
+def test_filaments_in_a_flow_agree(gpu, variant):
     for scheme in ("implicit", "midpoint"):
         _compare(gpu, variant, scheme, "double", flow=SHEAR)
-
-
-def _add_of_all_lengths(filaments):
-    """From the fewest nodes that there can be to some for each work-item of a group, and fixed ones in the middle."""
-    for number, segments in enumerate((1, 2, 3, 4, 5, 31, 32, 33, 64, 65, 100)):
-        filaments.add_equilibrium(ACTIN, segments, seed=number, start=[0.0, 500.0 * number, 0.0])
-    for number, fixed in enumerate(([5], [6], [7], [5, 6], [6, 7], [5, 6, 7], [4, 8], [0, 6], [0, 1, 12])):
-        filaments.add_equilibrium(ACTIN, 12, seed=number, start=[3000.0, 500.0 * number, 0.0], clamped=fixed)
-
-
-def _add_rings_of_all_lengths(filaments):
-    for number, segments in enumerate((4, 5, 6, 7, 8, 9, 33, 64, 100)):
-        filaments.add_ring(ACTIN, segments, [0.0, 900.0 * number, 0.0], [1, 2, 3])
-
-
-def _compare_work_items(gpu, monkeypatch, add, step, scheme):
-    """How many of 40 steps were divided, by the work-items of a filament, which lead to the same positions."""
-    ends, divided = [], []
-    for items in WORK_ITEMS:
-        monkeypatch.setenv("CYLCHAIN_WORK_ITEMS", str(items))
-        filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
-        add(filaments)
-        _, system, start = filaments.build()
-        integrator = filaments.create_integrator(system, step, scheme, random_seed=4, checks=False)
-        context = new_context(system, start, integrator, gpu, {"Precision": "double"})
-        integrator.step(40)
-        ends.append(positions_of(context))
-        divided.append(integrator.getNumDividedSteps())
-    moved = np.abs(ends[0] - start._value).max(axis=1)
-    assert np.median(moved) > 1 and all(np.abs(end - ends[0]).max() < 1e-10 for end in ends[1:])
-    return divided
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order"])
-def test_filaments_of_any_length_move_alike_either_way(gpu, scheme, monkeypatch):
-    assert _compare_work_items(gpu, monkeypatch, _add_of_all_lengths, 2e6, scheme) == [0] * len(WORK_ITEMS)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order"])
-def test_rings_of_any_length_move_alike_either_way(gpu, scheme, monkeypatch):
-    """The steps of short ones are too long for them, and divided."""
-    divided = _compare_work_items(gpu, monkeypatch, _add_rings_of_all_lengths, 2e6, scheme)
-    assert len(set(divided)) == 1 and divided[0] > 20
-
-
-@pytest.mark.slow
-def test_divided_steps_are_those_of_one_work_item(gpu, monkeypatch):
-    divided = _compare_work_items(gpu, monkeypatch, _add_of_all_lengths, 3e7, "implicit")
-    assert len(set(divided)) == 1 and divided[0] > 0
-
-
-def test_other_numbers_of_work_items_are_refused(gpu, monkeypatch):
-    monkeypatch.setenv("CYLCHAIN_WORK_ITEMS", "7")
-    context = _context("open", "implicit", gpu, "double")
-    with pytest.raises(openmm.OpenMMException, match="CYLCHAIN_WORK_ITEMS must be 1, 8 or 32, but is 7"):
-        context.getIntegrator().step(1)
 
 
 BOX = 1500.0
@@ -221,8 +140,7 @@ def _crossing_context(platform, precision=None, tether=True):
     return new_context(system, positions, integrator, platform, {"Precision": precision} if precision else {})
 
 
-@EITHER_WAY_IF_SLOW
-def test_filaments_cross_a_periodic_box_while_particles_are_reordered(gpu, work_items):
+def test_filaments_cross_a_periodic_box_while_particles_are_reordered(gpu):
     """For longer than OpenMM waits to reorder particles; the tether's point is some boxes away from its node."""
     expected, found = _crossing_context("Reference"), _crossing_context(gpu, "double")
     start = positions_of(expected)
@@ -268,8 +186,7 @@ def test_couplings_reach_across_periodic_boxes(gpu):
     assert np.abs(positions_of(found) - positions_of(expected)).max() < TOLERANCES["double"]
 
 
-@EITHER_WAY_IF_SLOW
-def test_failure_leaves_positions_before_the_step(gpu, work_items):
+def test_failure_leaves_positions_before_the_step(gpu):
     context = _context("open", "implicit", gpu, "double")
     integrator = context.getIntegrator()
     integrator.step(3)
@@ -284,8 +201,7 @@ def test_failure_leaves_positions_before_the_step(gpu, work_items):
     assert positions_of(context) == pytest.approx(before, abs=1e-9) and context.getStepCount() == steps
 
 
-@EITHER_WAY_IF_SLOW
-def test_checkpoint_continues_the_same_trajectory(gpu, work_items):
+def test_checkpoint_continues_the_same_trajectory(gpu):
     first, second = (_context("open", "implicit", gpu, "mixed") for _ in range(2))
     first.getIntegrator().step(5)
     checkpoint = first.createCheckpoint()
@@ -295,8 +211,7 @@ def test_checkpoint_continues_the_same_trajectory(gpu, work_items):
     assert np.array_equal(positions_of(first), positions_of(second))
 
 
-@EITHER_WAY_IF_SLOW
-def test_steps_taken_together_are_those_taken_one_by_one(gpu, work_items):
+def test_steps_taken_together_are_those_taken_one_by_one(gpu):
     ends = []
     for counts in ([40], [1] * 40):
         filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
@@ -311,8 +226,7 @@ def test_steps_taken_together_are_those_taken_one_by_one(gpu, work_items):
     assert np.array_equal(*ends)
 
 
-@EITHER_WAY_IF_SLOW
-def test_moved_tethers_hold_filaments_elsewhere(gpu, work_items):
+def test_moved_tethers_hold_filaments_elsewhere(gpu):
     """Parameters are updated in one of two Contexts, which follows the Reference platform as before."""
     contexts, ends = [], []
     for platform, precision in (("Reference", None), (gpu, "double"), (gpu, "double")):
@@ -332,8 +246,7 @@ def test_moved_tethers_hold_filaments_elsewhere(gpu, work_items):
     assert np.abs(ends[2] - ends[0]).max() > 10
 
 
-@EITHER_WAY_IF_SLOW
-def test_filaments_among_many_particles_with_virtual_sites_agree(gpu, work_items):
+def test_filaments_among_many_particles_with_virtual_sites_agree(gpu):
     """100 steps with noise of all that a System of particles has, and ten filaments."""
     (filaments, expected), (_, found) = mixed_context("Reference"), mixed_context(gpu, "double")
     start = positions_of(expected)
@@ -374,10 +287,11 @@ def _coupled_context(what, scheme, platform, properties=None):
     return new_context(system, positions, integrator, platform, properties)
 
 
+@pytest.mark.parametrize("scheme", ["implicit", "midpoint"])
 @pytest.mark.parametrize("what", COUPLINGS)
-def test_explicit_steps_with_couplings_agree(gpu, what):
-    expected, bare = _coupled_context(what, "midpoint", "Reference"), _context("open", "midpoint", "Reference")
-    found = _coupled_context(what, "midpoint", gpu, {"Precision": "double"})
+def test_steps_with_couplings_agree(gpu, what, scheme):
+    expected, bare = _coupled_context(what, scheme, "Reference"), _context("open", scheme, "Reference")
+    found = _coupled_context(what, scheme, gpu, {"Precision": "double"})
     forces = forces_of(expected)
     added = np.abs(forces - forces_of(bare)).max()
     assert added > 1.0
@@ -403,18 +317,6 @@ def test_a_link_out_of_its_range_is_named_before_the_step(gpu):
     assert np.array_equal(positions_of(context), before) and context.getStepCount() == 0
 
 
-@pytest.mark.parametrize("what", COUPLINGS)
-def test_implicit_steps_with_couplings_are_refused(gpu, what):
-    context = _coupled_context(what, "implicit", gpu, {"Precision": "double"})
-    before = positions_of(context)
-    with pytest.raises(
-        openmm.OpenMMException, match=f"On the {gpu} platform, filaments with links, contacts or walls take"
-    ) as caught:
-        context.getIntegrator().step(1)
-    assert np.array_equal(positions_of(context), before)
-    assert 'filaments.recommended_time_step("midpoint", system=system)' in str(caught.value)
-
-
 def _linked_context(platform, precision=None, scheme="midpoint"):
     """Filaments in a periodic box with crosslinkers, motors and anchored ones, whose hands come and go fast."""
     filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
@@ -435,11 +337,12 @@ def _linked_context(platform, precision=None, scheme="midpoint"):
     return filaments, new_context(system, positions, integrator, platform, properties)
 
 
-def test_linkers_bind_walk_and_pull_at_explicit_steps(gpu):
+@pytest.mark.parametrize("scheme", ["implicit", "midpoint"])
+def test_linkers_bind_walk_and_pull(gpu, scheme):
     """Hands are where they are on the Reference platform, after many have bound and unbound; so are filaments."""
     tables, ends, energies = [], [], []
     for platform, precision in (("Reference", None), (gpu, "double")):
-        filaments, context = _linked_context(platform, precision)
+        filaments, context = _linked_context(platform, precision, scheme)
         here = filaments.in_context(context)
         start = here.linkers()
         context.getIntegrator().step(100)
@@ -468,53 +371,106 @@ def test_linkers_continue_from_checkpoints(gpu):
     assert np.array_equal(ends[0][1].filaments, ends[1][1].filaments)
 
 
-def test_implicit_steps_with_linkers_are_refused(gpu):
-    """Before the first step, though no linker is bound then."""
-    _, context = _linked_context(gpu, "double", "implicit")
-    before = positions_of(context)
-    with pytest.raises(openmm.OpenMMException, match=f"On the {gpu} platform, filaments with linkers take explicit"):
-        context.getIntegrator().step(1)
-    assert np.array_equal(positions_of(context), before) and context.getStepCount() == 0
+def _step_together(gpu, build, steps, tolerance=1e-7):
+    """The Filaments, and Contexts on Reference and on the GPU after some steps: their positions, which agree."""
+    contexts = []
+    for platform, precision in (("Reference", None), (gpu, "double")):
+        filaments, system, positions, integrator = build()
+        context = new_context(system, positions, integrator, platform, {"Precision": precision} if precision else {})
+        integrator.step(steps)
+        contexts.append(context)
+    ends = [positions_of(context) for context in contexts]
+    assert np.abs(ends[0] - positions._value).max() > 1000 * tolerance
+    assert np.abs(ends[1] - ends[0]).max() < tolerance
+    return filaments, contexts
 
 
-def test_modes_are_refused_with_the_context(gpu):
-    filaments, system, positions, arguments = filaments_of_variant("beads")
-    integrator = filaments.create_integrator(system, 0.05, "modes", checks=False, **arguments)
-    with pytest.raises(openmm.OpenMMException, match=f"On the {gpu} platform, filaments are not moved by their modes"):
-        new_context(system, positions, integrator, gpu)
+def test_modes_agree(gpu):
+    def build():
+        filaments, system, positions, arguments = filaments_of_variant("beads")
+        return (
+            filaments,
+            system,
+            positions,
+            filaments.create_integrator(system, 0.05, "modes", random_seed=4, checks=False, **arguments),
+        )
+
+    _step_together(gpu, build, 100, TOLERANCES["double"])
 
 
-def test_beam_elements_are_refused_with_the_context(gpu):
-    filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
-    filaments.add_straight(
-        replace(ACTIN, segment_length=100.0, element="beam", extension_relaxation_time=None), 3, [0, 0, 0], [1, 0, 0]
-    )
-    _, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, 1e6, checks=False)
-    with pytest.raises(
-        openmm.OpenMMException, match=f"On the {gpu} platform, filaments have no beam elements. Use the"
-    ):
-        new_context(system, positions, integrator, gpu)
+def test_beams_with_links_agree(gpu):
+    beam = replace(ACTIN, segment_length=100.0, element="beam", extension_relaxation_time=None)
+
+    def build():
+        filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
+        for number in range(3):
+            filaments.add_straight(beam, 3, [0, 30 * number, 0], [1, 0, 0])
+        _, system, positions = filaments.build()
+        links = Crosslinks(0.1, 30.0)
+        for number in range(2):
+            links.add(None, *(filaments.segment_place(number + one, arc_length=150.0) for one in (0, 1)))
+        links.add_to(system)
+        return filaments, system, positions, filaments.create_integrator(system, 1e6, random_seed=2, checks=False)
+
+    _step_together(gpu, build, 50)
+
+
+def test_bodies_linkers_and_growing_filaments_agree(gpu):
+    """A pole of growing microtubules in a cell, beside linkers that diffuse, and beside particles of OpenMM."""
+
+    def build():
+        filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
+        actin = F_ACTIN.with_segment_length(108.0)
+        directions = np.eye(3)
+        for direction in directions:
+            filaments.add_straight(actin, 4, 200.0 * direction, direction)
+            growth = Growth(monomers=ACTIN_ATP, pool=MonomerPool(unit.Quantity(5e-5, unit.molar)), longest=2000.0)
+            filaments.add_straight(actin, 4, -300.0 * direction, -direction, growth=growth)
+        pole = filaments.add_body(Body.sphere(200.0, 200.0 * directions), [0, 0, 0])
+        hand = Hand(binding_rate=3e-5, reach=50.0, unbinding_rate=1e-6)
+        filaments.add_linkers(Crosslinker(hands=hand, stiffness=0.06), count=300, diffusion=1e-3)
+        _, system, positions = filaments.build()
+        places = filaments.body_indices[pole]
+        links = Crosslinks(60.0, 0.0)
+        for nodes, place in zip(filaments.node_indices[::2], places[1:], strict=True):
+            links.add(None, int(nodes[0]), int(place))
+        links.add_to(system)
+        system.addForce(filament_wall_force(filaments, system, Sphere((0, 0, 0), 1500.0), 0.1))
+        return filaments, system, positions, filaments.create_integrator(system, 1e7, random_seed=2, checks=False)
+
+    filaments, contexts = _step_together(gpu, build, 20)
+    tables = [filaments.in_context(context).linkers() for context in contexts]
+    assert tables[0].counts()[1] > 0 and np.array_equal(tables[0].filaments, tables[1].filaments)
 
 
 @pytest.mark.parametrize("scheme", ["implicit", "midpoint"])
-def test_mixed_precision_of_steps_is_refused_before_them(gpu, scheme):
+def test_mixed_precision_of_steps_is_theirs(gpu, scheme):
     """By one name for another: it is not the platform's."""
-    filaments, system, positions, arguments = filaments_of_variant("open")
-    step = step_of_variant("open", scheme)
-    integrator = filaments.create_integrator(system, step, scheme, precision="mixed", checks=False, **arguments)
-    context = new_context(system, positions, integrator, gpu, {"Precision": "mixed"})
-    before = positions_of(context)
-    with pytest.raises(openmm.OpenMMException, match=f'On the {gpu} platform, steps .* Use precision "automatic" or'):
-        integrator.step(1)
-    assert np.array_equal(positions_of(context), before) and context.getStepCount() == 0
-    integrator.setPrecision(integrator.Automatic)
-    integrator.step(1)
-    assert not np.array_equal(positions_of(context), before)
+
+    def build():
+        filaments, system, positions, arguments = filaments_of_variant("open")
+        step = step_of_variant("open", scheme)
+        return (
+            filaments,
+            system,
+            positions,
+            filaments.create_integrator(
+                system, step, scheme, precision="mixed", random_seed=2, checks=False, **arguments
+            ),
+        )
+
+    _, contexts = _step_together(gpu, build, 20, TOLERANCES["double"])
+    counts = [context.getIntegrator().getNumMixedPrecisionChains() for context in contexts]
+    assert counts[0] == counts[1] and (scheme == "midpoint") == (counts[0] == 0)
 
 
-def test_tensions_are_refused_before_the_step(gpu):
-    context = _context("open", "implicit", gpu, "double")
-    context.getIntegrator().setRecordsTensions(True)
-    with pytest.raises(openmm.OpenMMException, match=f"On the {gpu} platform, tensions.*Use the CPU platform"):
-        context.getIntegrator().step(1)
+def test_tensions_agree(gpu):
+    found = []
+    for platform, precision in (("Reference", None), (gpu, "double")):
+        filaments, system, positions, arguments = filaments_of_variant("open")
+        integrator = filaments.create_integrator(system, 2e6, random_seed=4, checks=False, **arguments)
+        context = new_context(system, positions, integrator, platform, {"Precision": precision} if precision else {})
+        integrator.setRecordsTensions(True)
+        integrator.step(2)
+        found.append(filaments.in_context(context).mean_axial_tensions()[0]._value)
+    assert np.abs(found[0]).max() > 0.1 and found[1] == pytest.approx(found[0], rel=1e-5, abs=1e-5)

@@ -1,6 +1,5 @@
 """A platform of OpenMM with its precision. Importing this creates no Context, which OpenMM may write a warning of."""
 
-import os
 from dataclasses import dataclass
 
 import openmm_cylchain
@@ -23,8 +22,6 @@ class CompiledPlatform:
         In nm, by which stored positions are rounded that are less than 2048 nm from the origin.
     path_tolerance : float
         In nm, by which such positions may differ after up to 100 steps with noise.
-    items : int or None
-        How many work-items take the implicit steps of a filament on a platform for GPUs. None elsewhere.
     """
 
     name: str
@@ -32,11 +29,9 @@ class CompiledPlatform:
     tolerance: float
     rounding: float
     path_tolerance: float
-    items: int | None = None
 
     def __str__(self):
-        items = "" if self.items in (None, 1) else f"-by-{self.items}"
-        return self.name if self.precision is None else f"{self.name}-{self.precision}{items}"
+        return self.name if self.precision is None else f"{self.name}-{self.precision}"
 
     @property
     def properties(self):
@@ -44,7 +39,6 @@ class CompiledPlatform:
         return {} if self.precision is None else {"Precision": self.precision}
 
     def enable(self):
-        """Load the plugin of a platform for GPUs, and say how many work-items it takes for a filament."""
+        """Load the plugin of a platform for GPUs."""
         if self.name in GPU_PLATFORMS:
-            os.environ["CYLCHAIN_WORK_ITEMS"] = "" if self.items is None else str(self.items)
             openmm_cylchain.enable_platform(self.name)

@@ -42,21 +42,14 @@ NOT_TESTED = {name: why_not_on(name) or "there is no device" for name in GPU_PLA
 """Why they are not on the others."""
 
 CPU_CASES = [CompiledPlatform(name, None, 1e-9, 0.0, 1e-9) for name in PLATFORMS if name in ("Reference", "CPU")]
-WORK_ITEMS = (1, 8, 32)
-"""How many work-items may take the implicit steps of a filament on platforms for GPUs."""
-
-# Groups solve the same equations in double precision in all of them.
 GPU_CASES = [
-    CompiledPlatform(name, precision, *TOLERANCES[precision], items)
-    for name in GPU_NAMES
-    for precision, items in (*((precision, 1) for precision in TOLERANCES), ("mixed", 32))
+    CompiledPlatform(name, precision, *TOLERANCES[precision]) for name in GPU_NAMES for precision in TOLERANCES
 ]
 COMPILED_PLATFORMS = CPU_CASES + GPU_CASES
 
 
 def _marks(case):
-    # PoCL compiles kernels for many seconds, for each precision.
-    return [pytest.mark.slow] if case.precision in ("single", "double") or case.items == 32 else []
+    return [pytest.mark.slow] if case.precision in ("single", "double") else []
 
 
 ON_COMPILED_PLATFORMS = pytest.mark.parametrize(

@@ -34,7 +34,7 @@ void CylinderChainContactForceImpl::initialize(ContextImpl& context) {
     kernel = context.getPlatform().createKernel(CalcCylinderChainContactForceKernel::Name(), context);
     kernel.getAs<CalcCylinderChainContactForceKernel>().initialize(system, *search, stiffness, periodic);
     beginSums(system.getNumParticles());
-    notesPushes = kernel.getAs<CalcCylinderChainContactForceKernel>().notePushes(present);
+    kernel.getAs<CalcCylinderChainContactForceKernel>().notePushes(present);
 }
 
 double CylinderChainContactForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces,

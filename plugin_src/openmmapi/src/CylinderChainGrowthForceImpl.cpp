@@ -55,9 +55,6 @@ void CylinderChainGrowthForceImpl::initialize(ContextImpl& context) {
             &context.getIntegrator());
     requireOfGrowing(integrator != NULL && isImplicit(static_cast<Scheme>(integrator->getScheme())),
             "Chains that grow need a CylinderChainIntegrator with an implicit scheme");
-    const string platform = context.getPlatform().getName();
-    requireOfGrowing(platform == "Reference" || platform == "CPU",
-            "Chains grow on the Reference and CPU platforms, not on "+platform);
     seed = (uint32_t) integrator->getRandomNumberSeed();
     if (seed == 0)
         seed = (uint32_t) osrngseed();

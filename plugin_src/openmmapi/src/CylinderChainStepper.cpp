@@ -61,7 +61,6 @@ CylinderChainStepper::CylinderChainStepper(ContextImpl& context, const CylinderC
         growth(findGrowth(context)), others(context.getSystem(), integrator, chains), couplings(context, others),
         kernel(createKernel(context, force, others)),
         explicitWork(getKernel().getLoop()), periodic(isPeriodic(context.getSystem())), recorded(false) {
-    getKernel().refuseScheme(static_cast<Scheme>(integrator.getScheme()));
     if (isImplicit(static_cast<Scheme>(integrator.getScheme())))
         couplings.refuseBox(chains);
     couplings.refuseChains(chains);
@@ -275,8 +274,8 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
     takeNoteOfForces(settings, followsOn);
     if (growth != NULL)
         growth->refuseForces(getKernel().getForces(context));
-    getKernel().displaceOthers(context, settings, integrator.getFriction());
     const CoupledForces& coupled = couplings.describe(getCoupledGroups(), integrator.getFriction());
+    getKernel().displaceOthers(context, settings, integrator.getFriction());
     if (settings.scheme == Scheme::ImplicitSecondOrder)
         couplings.refuseTwoStages(getCoupledGroups());
     const bool moveAlone = coupled.empty() && others.getBodies().empty();

@@ -74,7 +74,7 @@ void CylinderChainWallForceImpl::initialize(ContextImpl& context) {
     kernel = context.getPlatform().createKernel(CalcCylinderChainWallForceKernel::Name(), context);
     kernel.getAs<CalcCylinderChainWallForceKernel>().initialize(context.getSystem(), walls);
     beginSums(system.getNumParticles());
-    notesPushes = kernel.getAs<CalcCylinderChainWallForceKernel>().notePushes(present);
+    kernel.getAs<CalcCylinderChainWallForceKernel>().notePushes(present);
 }
 
 void CylinderChainWallForceImpl::findPushes(ContextImpl& context, vector<Push>& pushes) const {

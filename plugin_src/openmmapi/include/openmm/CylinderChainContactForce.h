@@ -175,7 +175,7 @@ public:
     /**
      * Get the mean force of contacts over the steps of CylinderChainIntegrator since a reader has asked for it last, or
      * since the Context was made.  Checkpoints hold the sums, States do not.  Implicit steps know the mean within them;
-     * explicit ones have the force at their start.  If there were no such steps, or on platforms for GPUs, it is the
+     * explicit ones have the force at their start.  If there were no such steps, it is the
      * force at the present positions.
      *
      * @param context      a Context with this force

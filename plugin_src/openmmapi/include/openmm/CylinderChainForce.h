@@ -246,7 +246,7 @@ public:
     void setJointParameters(int chain, int joint, double stiffness);
     /**
      * Add a chain of beam elements, which bend inside; mechanics/BeamChain.h says what they are.  Only scheme
-     * "implicit" moves them, on the Reference and CPU platforms.  Any other Force may act on their particles.
+     * "implicit" moves them.  Any other Force may act on their particles.
      *
      * @param particles             two for each node, its position and its control point, for at least two nodes, and
      *                              none of them twice

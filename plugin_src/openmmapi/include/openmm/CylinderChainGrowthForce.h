@@ -16,9 +16,8 @@ namespace OpenMM {
  *
  * The particles of a chain that grows are its nodes as far as its monomers need them, from the first particle on.  The
  * others are spare: they are where the last node is, and nothing acts on them.  A chain that has no spare node left
- * waits.  A System can have one such Force.  Its chains are moved by the implicit schemes of CylinderChainIntegrator on
- * the Reference and CPU platforms.  They may have walls, contacts and linkers of this plugin; no other Force may act on
- * them.
+ * waits.  A System can have one such Force.  Its chains are moved by the implicit schemes of CylinderChainIntegrator.
+ * They may have walls, contacts and linkers of this plugin; no other Force may act on them.
  *
  * How far chains have grown belongs to a Context.  Checkpoints of the integrator hold it, and so do States with the
  * integrator's parameters.

@@ -67,23 +67,19 @@ public:
      */
     virtual void copyParametersToContext(ContextImpl& context) = 0;
     /**
-     * Take over chains that have grown or shrunk, where this platform has such.
+     * Take over chains that have grown or shrunk.
      *
      * @param changed  their numbers among the chains of straight segments
      */
-    virtual void replaceChains(ContextImpl&, const std::vector<int>&) {
-    }
+    virtual void replaceChains(ContextImpl& context, const std::vector<int>& changed) = 0;
     /**
      * Describe how chains that have grown are arranged, on which the last digits of results depend.
      */
-    virtual std::vector<int> getArrangement() {
-        return {};
-    }
+    virtual std::vector<int> getArrangement() = 0;
     /**
      * Arrange chains as they were described to be, if that can be.
      */
-    virtual void setArrangement(const std::vector<int>&) {
-    }
+    virtual void setArrangement(const std::vector<int>& arrangement) = 0;
 };
 
 /**
@@ -119,14 +115,13 @@ public:
     virtual double execute(ContextImpl& context, const std::vector<cylchain::Link>& links, bool includeForces,
             bool includeEnergy, int& outOfRange) = 0;
     /**
-     * Get the equations of links in an implicit step, or NULL if this platform has none.
+     * Get the equations of links in an implicit step.
      *
      * @param context  the context in which to execute this kernel
      * @param links    the links of the context, which exist until the step has been taken
      */
-    virtual cylchain::ImplicitCouplings* getEquations(ContextImpl&, const std::vector<cylchain::Link>&) {
-        return NULL;
-    }
+    virtual cylchain::ImplicitCouplings* getEquations(ContextImpl& context,
+            const std::vector<cylchain::Link>& links) = 0;
 };
 
 /**
@@ -160,13 +155,9 @@ public:
      */
     virtual double execute(ContextImpl& context, bool includeForces, bool includeEnergy) = 0;
     /**
-     * Have execute() take note of the forces that it computes, where it computes them: it replaces what stands here.
-     *
-     * @return whether this platform does so
+     * Have execute() take note of the forces that it computes: it replaces what stands here.
      */
-    virtual bool notePushes(std::vector<cylchain::Push>&) {
-        return false;
-    }
+    virtual void notePushes(std::vector<cylchain::Push>& pushes) = 0;
     /**
      * Take over another stiffness, and other radii, which the search has already.
      *
@@ -175,17 +166,16 @@ public:
      */
     virtual void copyParametersToContext(ContextImpl& context, double stiffness) = 0;
     /**
-     * Get the equations of contacts in an implicit step, or NULL if this platform has none.
+     * Get the equations of contacts in an implicit step.
      *
      * @param context   the context in which to execute this kernel
      * @param onCurves  the capsules between places on the curve of a beam element; they exist for as long as the kernel
      * @param sites     the virtual sites there
      * @param impulses  receives the forces of the step
      */
-    virtual cylchain::ImplicitCouplings* getEquations(ContextImpl&, const std::vector<cylchain::CapsuleOnCurve>&,
-            const std::vector<cylchain::CurveSite>&, cylchain::CouplingImpulses&) {
-        return NULL;
-    }
+    virtual cylchain::ImplicitCouplings* getEquations(ContextImpl& context,
+            const std::vector<cylchain::CapsuleOnCurve>& onCurves, const std::vector<cylchain::CurveSite>& sites,
+            cylchain::CouplingImpulses& impulses) = 0;
 };
 
 /**
@@ -216,13 +206,9 @@ public:
      */
     virtual double execute(ContextImpl& context, bool includeForces, bool includeEnergy) = 0;
     /**
-     * Have execute() take note of the forces that it computes, where it computes them: it replaces what stands here.
-     *
-     * @return whether this platform does so
+     * Have execute() take note of the forces that it computes: it replaces what stands here.
      */
-    virtual bool notePushes(std::vector<cylchain::Push>&) {
-        return false;
-    }
+    virtual void notePushes(std::vector<cylchain::Push>& pushes) = 0;
     /**
      * Take over another region, stiffness and radii.
      *
@@ -231,13 +217,11 @@ public:
      */
     virtual void copyParametersToContext(ContextImpl& context, const cylchain::WallSystem& walls) = 0;
     /**
-     * Get the equations of walls in an implicit step, or NULL if this platform has none.
+     * Get the equations of walls in an implicit step.
      *
      * @param impulses  receives the forces of the step
      */
-    virtual cylchain::ImplicitCouplings* getEquations(cylchain::CouplingImpulses&) {
-        return NULL;
-    }
+    virtual cylchain::ImplicitCouplings* getEquations(cylchain::CouplingImpulses& impulses) = 0;
 };
 
 /**
@@ -261,13 +245,12 @@ public:
     virtual void initialize(const cylchain::LinkerSystem& system, const cylchain::ChainList& chains, bool periodic,
             bool nearestParticles) = 0;
     /**
-     * Take note that chains have grown or shrunk, where this platform has such: see
-     * cylchain::LinkerKinetics::setChains(). Random numbers are those of execute().
+     * Take note that chains have grown or shrunk: see cylchain::LinkerKinetics::setChains(). Random numbers are those of
+     * execute().
      */
-    virtual bool setChains(ContextImpl&, const cylchain::ChainList&, const std::vector<cylchain::ChainCut>&,
-            cylchain::LinkerState&, std::uint32_t, int) {
-        return false;
-    }
+    virtual bool setChains(ContextImpl& context, const cylchain::ChainList& chains,
+            const std::vector<cylchain::ChainCut>& cuts, cylchain::LinkerState& state, std::uint32_t seed,
+            int force) = 0;
     /**
      * Set within which walls linkers are that diffuse.
      */
@@ -355,12 +338,7 @@ public:
     virtual void initialize(const System& system, const CylinderChainDescription& chains, const OtherParticles& others,
             CalcCylinderChainForceKernel& forceKernel) = 0;
     /**
-     * Throw an exception if this platform cannot take steps of a scheme.
-     */
-    virtual void refuseScheme(cylchain::Scheme) {
-    }
-    /**
-     * Get the loop over particles that this platform has for its host.
+     * Get the loop over particles of the processor.
      */
     virtual ParallelLoop& getLoop() = 0;
     /**
@@ -383,7 +361,8 @@ public:
     virtual cylchain::Instability displaceChains(ContextImpl& context, const cylchain::StepSettings& settings) = 0;
     /**
      * Compute the displacements of chains that are coupled, and of the particles that are coupled to them, in one step
-     * of an implicit scheme.  Positions do not change.  displaceOthers() has been called before.
+     * of an implicit scheme.  Positions do not change.  displaceOthers() has been called before, after the equations
+     * of what couples them.
      *
      * @param context   the context in which to execute this kernel
      * @param settings  the settings of the step

@@ -10,9 +10,6 @@ typedef struct {
 /** The four words of Philox 4x32-10. */
 typedef struct {unsigned int w0, w1, w2, w3;} Words;
 
-/** Two candidates of a bend or a length, and whether to accept them: a number between 0 and 1. */
-typedef struct {double first, second, uniform;} Candidate;
-
 inline DEVICE Words drawWords(unsigned int seed, unsigned int level, mm_ulong number, unsigned int kind,
         unsigned int chain, unsigned int part, unsigned int draw) {
     unsigned int key = seed, stream = kind<<29 | level<<24 | draw;
@@ -52,10 +49,6 @@ inline DEVICE double2 normalPair(unsigned int a, unsigned int b) {
     return (b>>23)&1 ? make_double2(y, x) : make_double2(x, y);
 }
 
-inline DEVICE double uniformOf(unsigned int a, unsigned int b) {
-    return (double) (((mm_ulong) a<<20)|(b>>12)|1)*(1/4503599627370496.0);
-}
-
 /** The normal numbers 4 draw to 4 draw+3 of a place. */
 DEVICE double4 drawNormals(NoiseKey key, unsigned int kind, unsigned int chain, unsigned int part,
         unsigned int draw) {
@@ -72,28 +65,4 @@ DEVICE double4 drawNormals(NoiseKey key, unsigned int kind, unsigned int chain, 
             result = (result+drawn*(number&1 ? -1.0 : 1.0))*0.70710678118654752440;
     }
     return result;
-}
-
-/** The first candidate of a place, which follows the Brownian path. */
-inline DEVICE Candidate firstCandidate(NoiseKey key, unsigned int kind, unsigned int chain, unsigned int part) {
-    Words words = drawWords(key.seed, key.level, key.step, kind, chain, part, 0);
-    double4 normals = drawNormals(key, kind, chain, part, 0);
-    Candidate result = {normals.x, normals.y, uniformOf(words.w2, words.w3)};
-    return result;
-}
-
-/** Another candidate of a place; the first one has the number 0. */
-inline DEVICE Candidate nextCandidate(NoiseKey key, unsigned int kind, unsigned int chain, unsigned int part,
-        unsigned int draw) {
-    Words words = drawWords(key.seed, key.level, key.step, kind, chain, part, draw);
-    double2 normals = normalPair(words.w0, words.w1);
-    Candidate result = {normals.x, normals.y, uniformOf(words.w2, words.w3)};
-    return result;
-}
-
-/** Two numbers between 0 and 1 of a place. */
-inline DEVICE double2 drawUniforms(NoiseKey key, unsigned int kind, unsigned int chain, unsigned int part,
-        unsigned int draw) {
-    Words words = drawWords(key.seed, key.level, key.step, kind, chain, part, draw);
-    return make_double2(uniformOf(words.w0, words.w1), uniformOf(words.w2, words.w3));
 }

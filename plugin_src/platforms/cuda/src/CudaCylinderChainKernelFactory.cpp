@@ -1,5 +1,6 @@
 #include "CudaCylinderChainKernelFactory.h"
-#include "CommonCylinderChainKernels.h"
+#include "CommonParticles.h"
+#include "ReferenceCylinderChainKernelFactory.h"
 #include "openmm/cuda/CudaContext.h"
 #include "openmm/cuda/CudaPlatform.h"
 #include "openmm/internal/ContextImpl.h"
@@ -17,7 +18,7 @@ CYLCHAIN_EXPORT void registerKernelFactories() {
         Platform& platform = Platform::getPlatform(i);
         if (platform.getName() == "CUDA") {
             CudaCylinderChainKernelFactory* factory = new CudaCylinderChainKernelFactory();
-            for (const string& name : getCommonKernelNames())
+            for (const string& name : getHostKernelNames())
                 platform.registerKernelFactory(name, factory);
         }
     }
@@ -25,7 +26,6 @@ CYLCHAIN_EXPORT void registerKernelFactories() {
 
 KernelImpl* CudaCylinderChainKernelFactory::createKernelImpl(string name, const Platform& platform,
         ContextImpl& context) const {
-    CudaContext& cu = *static_cast<CudaPlatform::PlatformData*>(context.getPlatformData())->contexts[0];
-    // A kernel may have this much local memory without asking for more. Parts of a warp go their own ways since Volta.
-    return createCommonKernel(name, platform, cu, {48*1024, cu.getComputeCapability() >= 7});
+    ComputeContext& cc = *static_cast<CudaPlatform::PlatformData*>(context.getPlatformData())->contexts[0];
+    return createCommonKernel(name, platform, context, cc);
 }

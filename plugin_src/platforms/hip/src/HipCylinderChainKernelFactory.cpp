@@ -1,5 +1,6 @@
 #include "HipCylinderChainKernelFactory.h"
-#include "CommonCylinderChainKernels.h"
+#include "CommonParticles.h"
+#include "ReferenceCylinderChainKernelFactory.h"
 #include "openmm/hip/HipContext.h"
 #include "openmm/hip/HipPlatform.h"
 #include "openmm/internal/ContextImpl.h"
@@ -17,7 +18,7 @@ CYLCHAIN_EXPORT void registerKernelFactories() {
         Platform& platform = Platform::getPlatform(i);
         if (platform.getName() == "HIP") {
             HipCylinderChainKernelFactory* factory = new HipCylinderChainKernelFactory();
-            for (const string& name : getCommonKernelNames())
+            for (const string& name : getHostKernelNames())
                 platform.registerKernelFactory(name, factory);
         }
     }
@@ -26,5 +27,5 @@ CYLCHAIN_EXPORT void registerKernelFactories() {
 KernelImpl* HipCylinderChainKernelFactory::createKernelImpl(string name, const Platform& platform,
         ContextImpl& context) const {
     ComputeContext& cc = *static_cast<HipPlatform::PlatformData*>(context.getPlatformData())->contexts[0];
-    return createCommonKernel(name, platform, cc, {48*1024, false});
+    return createCommonKernel(name, platform, context, cc);
 }

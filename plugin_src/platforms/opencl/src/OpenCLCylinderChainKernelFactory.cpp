@@ -1,5 +1,6 @@
 #include "OpenCLCylinderChainKernelFactory.h"
-#include "CommonCylinderChainKernels.h"
+#include "CommonParticles.h"
+#include "ReferenceCylinderChainKernelFactory.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/opencl/OpenCLContext.h"
 #include "openmm/opencl/OpenCLPlatform.h"
@@ -17,7 +18,7 @@ CYLCHAIN_EXPORT void registerKernelFactories() {
         Platform& platform = Platform::getPlatform(i);
         if (platform.getName() == OpenCLPlatform().getName()) {
             OpenCLCylinderChainKernelFactory* factory = new OpenCLCylinderChainKernelFactory();
-            for (const string& name : getCommonKernelNames())
+            for (const string& name : getHostKernelNames())
                 platform.registerKernelFactory(name, factory);
         }
     }
@@ -25,7 +26,6 @@ CYLCHAIN_EXPORT void registerKernelFactories() {
 
 KernelImpl* OpenCLCylinderChainKernelFactory::createKernelImpl(string name, const Platform& platform,
         ContextImpl& context) const {
-    OpenCLContext& cl = *static_cast<OpenCLPlatform::PlatformData*>(context.getPlatformData())->contexts[0];
-    const cl_ulong localMemory = cl.getDevice().getInfo<CL_DEVICE_LOCAL_MEM_SIZE>();
-    return createCommonKernel(name, platform, cl, {(int) min(localMemory, (cl_ulong) (48*1024)), false});
+    ComputeContext& cc = *static_cast<OpenCLPlatform::PlatformData*>(context.getPlatformData())->contexts[0];
+    return createCommonKernel(name, platform, context, cc);
 }

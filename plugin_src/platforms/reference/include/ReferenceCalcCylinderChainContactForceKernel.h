@@ -1,9 +1,10 @@
 #ifndef OPENMM_REFERENCECALCCYLINDERCHAINCONTACTFORCEKERNEL_H_
 #define OPENMM_REFERENCECALCCYLINDERCHAINCONTACTFORCEKERNEL_H_
 
-#include "ReferenceParallelLoop.h"
+#include "HostParticles.h"
 #include "networks/ContactGaps.h"
 #include "openmm/CylinderChainKernels.h"
+#include <memory>
 #include <vector>
 
 namespace OpenMM {
@@ -17,10 +18,11 @@ namespace OpenMM {
  */
 class ReferenceCalcCylinderChainContactForceKernel : public CalcCylinderChainContactForceKernel {
 public:
-    ReferenceCalcCylinderChainContactForceKernel(std::string name, const Platform& platform, ContextImpl& context);
+    ReferenceCalcCylinderChainContactForceKernel(std::string name, const Platform& platform,
+            std::shared_ptr<HostParticles> particles);
     void initialize(const System& system, cylchain::ContactSearch& search, double stiffness, bool periodic);
     double execute(ContextImpl& context, bool includeForces, bool includeEnergy);
-    bool notePushes(std::vector<cylchain::Push>& pushes);
+    void notePushes(std::vector<cylchain::Push>& pushes);
     void copyParametersToContext(ContextImpl& context, double stiffness);
     cylchain::ImplicitCouplings* getEquations(ContextImpl& context,
             const std::vector<cylchain::CapsuleOnCurve>& onCurves, const std::vector<cylchain::CurveSite>& sites,
@@ -29,7 +31,7 @@ private:
     struct Touching;
     bool isListValid(const std::vector<Vec3>& positions, const Vec3* box) const;
     void findPairs(std::vector<Vec3>& positions, Vec3* box);
-    ReferenceParallelLoop loop;
+    std::shared_ptr<HostParticles> host;
     cylchain::ContactSearch* search;
     double stiffness, skin;
     bool periodic, hasList;

@@ -1,7 +1,7 @@
 #ifndef OPENMM_REFERENCECALCCYLINDERCHAINFORCEKERNEL_H_
 #define OPENMM_REFERENCECALCCYLINDERCHAINFORCEKERNEL_H_
 
-#include "ReferenceParallelLoop.h"
+#include "HostParticles.h"
 #include "beams/BeamEngine.h"
 #include "dynamics/ChainEngine.h"
 #include "openmm/CylinderChainKernels.h"
@@ -16,7 +16,8 @@ namespace OpenMM {
  */
 class ReferenceCalcCylinderChainForceKernel : public CalcCylinderChainForceKernel {
 public:
-    ReferenceCalcCylinderChainForceKernel(std::string name, const Platform& platform, ContextImpl& context);
+    ReferenceCalcCylinderChainForceKernel(std::string name, const Platform& platform,
+            std::shared_ptr<HostParticles> particles);
     void initialize(const System& system, const CylinderChainDescription& chains);
     double execute(ContextImpl& context, bool includeForces, bool includeEnergy);
     void computeEnergies(ContextImpl& context, double& stretching, double& bending);
@@ -64,11 +65,17 @@ public:
      * Get the box in which segments are taken as their shortest images, as nine numbers, or NULL if they are taken as
      * they are.
      */
-    const double* getBox(ContextImpl& context) const;
+    const double* getBox() const;
+    /**
+     * Get the particles of the Context.
+     */
+    HostParticles& getParticles() {
+        return *particles;
+    }
 private:
     void createEngines();
-    cylchain::ChainEnergy addForces(ContextImpl& context, std::vector<Vec3>& forces, bool includeEnergy);
-    ReferenceParallelLoop loop;
+    cylchain::ChainEnergy addForces(std::vector<Vec3>& forces, bool includeEnergy);
+    std::shared_ptr<HostParticles> particles;
     const CylinderChainDescription* chains;
     std::unique_ptr<cylchain::ChainEngine> engine;
     std::unique_ptr<cylchain::BeamEngine> beamEngine;

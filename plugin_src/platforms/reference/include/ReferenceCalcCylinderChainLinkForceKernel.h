@@ -1,9 +1,10 @@
 #ifndef OPENMM_REFERENCECALCCYLINDERCHAINLINKFORCEKERNEL_H_
 #define OPENMM_REFERENCECALCCYLINDERCHAINLINKFORCEKERNEL_H_
 
-#include "ReferenceParallelLoop.h"
+#include "HostParticles.h"
 #include "networks/LinkEquations.h"
 #include "openmm/CylinderChainKernels.h"
+#include <memory>
 #include <vector>
 
 namespace OpenMM {
@@ -14,14 +15,16 @@ namespace OpenMM {
  */
 class ReferenceCalcCylinderChainLinkForceKernel : public CalcCylinderChainLinkForceKernel {
 public:
-    ReferenceCalcCylinderChainLinkForceKernel(std::string name, const Platform& platform, ContextImpl& context);
+    ReferenceCalcCylinderChainLinkForceKernel(std::string name, const Platform& platform,
+            std::shared_ptr<HostParticles> particles);
     void initialize(const System& system, bool periodic, bool nearestParticles);
     double execute(ContextImpl& context, const std::vector<cylchain::Link>& links, bool includeForces,
             bool includeEnergy, int& outOfRange);
     cylchain::ImplicitCouplings* getEquations(ContextImpl& context, const std::vector<cylchain::Link>& links);
 private:
-    cylchain::LinkBoxes getBoxes(ContextImpl& context) const;
-    ReferenceParallelLoop loop;
+    void include(const std::vector<cylchain::Link>& links);
+    cylchain::LinkBoxes getBoxes() const;
+    std::shared_ptr<HostParticles> particles;
     bool periodic, nearestParticles;
     std::vector<cylchain::LinkPull> pulls;
     cylchain::LinkEquations equations;

@@ -1,9 +1,11 @@
 #ifndef OPENMM_REFERENCECALCCYLINDERCHAINWALLFORCEKERNEL_H_
 #define OPENMM_REFERENCECALCCYLINDERCHAINWALLFORCEKERNEL_H_
 
+#include "HostParticles.h"
 #include "networks/SurfaceEquations.h"
 #include "networks/WallGaps.h"
 #include "openmm/CylinderChainKernels.h"
+#include <memory>
 #include <vector>
 
 namespace OpenMM {
@@ -14,13 +16,15 @@ namespace OpenMM {
  */
 class ReferenceCalcCylinderChainWallForceKernel : public CalcCylinderChainWallForceKernel {
 public:
-    ReferenceCalcCylinderChainWallForceKernel(std::string name, const Platform& platform);
+    ReferenceCalcCylinderChainWallForceKernel(std::string name, const Platform& platform,
+            std::shared_ptr<HostParticles> particles);
     void initialize(const System& system, const cylchain::WallSystem& walls);
     double execute(ContextImpl& context, bool includeForces, bool includeEnergy);
-    bool notePushes(std::vector<cylchain::Push>& pushes);
+    void notePushes(std::vector<cylchain::Push>& pushes);
     void copyParametersToContext(ContextImpl& context, const cylchain::WallSystem& walls);
     cylchain::ImplicitCouplings* getEquations(cylchain::CouplingImpulses& impulses);
 private:
+    std::shared_ptr<HostParticles> host;
     cylchain::WallSystem walls;
     std::vector<cylchain::Push>* noted;
     cylchain::WallGaps equations;

@@ -2,7 +2,7 @@
 #define OPENMM_REFERENCEINTEGRATECYLINDERCHAINSTEPKERNEL_H_
 
 #include "ReferenceCalcCylinderChainForceKernel.h"
-#include "ReferenceParallelLoop.h"
+#include "HostParticles.h"
 #include "networks/NetworkStep.h"
 #include "openmm/CylinderChainKernels.h"
 #include <memory>
@@ -15,11 +15,12 @@ namespace OpenMM {
  */
 class ReferenceIntegrateCylinderChainStepKernel : public IntegrateCylinderChainStepKernel {
 public:
-    ReferenceIntegrateCylinderChainStepKernel(std::string name, const Platform& platform, ContextImpl& context);
+    ReferenceIntegrateCylinderChainStepKernel(std::string name, const Platform& platform,
+            std::shared_ptr<HostParticles> particles);
     void initialize(const System& system, const CylinderChainDescription& chains, const OtherParticles& others,
             CalcCylinderChainForceKernel& forceKernel);
     ParallelLoop& getLoop() {
-        return loop;
+        return particles->getLoop();
     }
     const std::vector<Vec3>& getForces(ContextImpl& context);
     const std::vector<Vec3>& getDisplacements() {
@@ -32,6 +33,15 @@ public:
     int findUnstableParticle() {
         return unstableParticle;
     }
+    bool sumsWork() const {
+        return particles->sumsWork();
+    }
+    void beginWork(const StepWork& work) {
+        particles->beginWork(work);
+    }
+    void getWork(std::vector<WorkSums>& sums) {
+        particles->getWork(sums);
+    }
     void move(ContextImpl& context, const cylchain::StepSettings& settings);
     int advanceChains(ContextImpl& context, const cylchain::StepSettings& settings, int count, long long& divided);
     void moveAdvanced(ContextImpl& context, const cylchain::StepSettings& settings, int count);
@@ -39,15 +49,18 @@ public:
         return mixedChains;
     }
 private:
-    template <class Engine> int advancePack(ContextImpl& context, const Engine& engine, int pack,
-            cylchain::StepSettings settings, int count, long long& divided);
-    void displaceBlock(int block, const std::vector<Vec3>& positions, const std::vector<Vec3>& forces,
-            const cylchain::StepSettings& settings, double friction);
-    void findNewPosition(ContextImpl& context, int particle, double stepSize);
-    void exchangePositions(ContextImpl& context, double time, int steps);
-    ReferenceParallelLoop loop;
+    template <class Engine> int advancePack(const Engine& engine, int pack, cylchain::StepSettings settings,
+            int count, long long& divided);
+    void displaceBlock(int block, const cylchain::StepSettings& settings, double friction);
+    template <class Particles> void findNewPositions(const Particles& own, double stepSize);
+    void finishSteps(double stepSize, int steps);
+    std::shared_ptr<HostParticles> particles;
     ReferenceCalcCylinderChainForceKernel* chainKernel;
     const OtherParticles* others;
+    // Those of them that can move by themselves, and that the processor sees; and as which version of these.
+
+    std::vector<int> mobile;
+    int versionOfMobile = -1;
     // Takes the steps of coupled chains, once there have been some, with the version of the engine that it knows.
 
     std::unique_ptr<cylchain::NetworkStep> network;

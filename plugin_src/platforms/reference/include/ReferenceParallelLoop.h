@@ -16,6 +16,11 @@ namespace OpenMM {
 class ReferenceParallelLoop : public ParallelLoop {
 public:
     explicit ReferenceParallelLoop(ContextImpl& context);
+    /**
+     * Use the threads of a pool, which must outlive this.
+     */
+    explicit ReferenceParallelLoop(ThreadPool& threads) : threads(&threads) {
+    }
     void run(int count, const std::function<void(int)>& iteration);
     /**
      * Call a function that runs many short loops, one after the other.  Threads stay awake between these for a while:

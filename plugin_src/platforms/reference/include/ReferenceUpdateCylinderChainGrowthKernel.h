@@ -1,6 +1,7 @@
 #ifndef OPENMM_REFERENCEUPDATECYLINDERCHAINGROWTHKERNEL_H_
 #define OPENMM_REFERENCEUPDATECYLINDERCHAINGROWTHKERNEL_H_
 
+#include "HostParticles.h"
 #include "openmm/CylinderChainKernels.h"
 #include <memory>
 #include <string>
@@ -13,8 +14,9 @@ namespace OpenMM {
  */
 class ReferenceUpdateCylinderChainGrowthKernel : public UpdateCylinderChainGrowthKernel {
 public:
-    ReferenceUpdateCylinderChainGrowthKernel(std::string name, const Platform& platform) :
-            UpdateCylinderChainGrowthKernel(name, platform) {
+    ReferenceUpdateCylinderChainGrowthKernel(std::string name, const Platform& platform,
+            std::shared_ptr<HostParticles> particles) : UpdateCylinderChainGrowthKernel(name, platform),
+            particles(particles) {
     }
     void initialize(const cylchain::GrowthSystem& system, const std::vector<cylchain::BendingModel>& bending,
             const std::vector<cylchain::StretchingModel>& stretching, const std::vector<char>& planar);
@@ -22,6 +24,7 @@ public:
             bool periodic, cylchain::ChainList& chains, const std::vector<cylchain::Surroundings*>& around);
     void placeSpareNodes(ContextImpl& context, const std::vector<cylchain::Chain>& chains);
 private:
+    std::shared_ptr<HostParticles> particles;
     std::unique_ptr<cylchain::ChainGrowth> growth;
 };
 

@@ -1,7 +1,7 @@
 #ifndef OPENMM_REFERENCEUPDATECYLINDERCHAINLINKERSKERNEL_H_
 #define OPENMM_REFERENCEUPDATECYLINDERCHAINLINKERSKERNEL_H_
 
-#include "ReferenceParallelLoop.h"
+#include "HostParticles.h"
 #include "kinetics/LinkerKinetics.h"
 #include "openmm/CylinderChainKernels.h"
 #include <memory>
@@ -13,25 +13,26 @@ namespace OpenMM {
  */
 class ReferenceUpdateCylinderChainLinkersKernel : public UpdateCylinderChainLinkersKernel {
 public:
-    ReferenceUpdateCylinderChainLinkersKernel(std::string name, const Platform& platform, ContextImpl& context);
+    ReferenceUpdateCylinderChainLinkersKernel(std::string name, const Platform& platform,
+            std::shared_ptr<HostParticles> particles);
     void initialize(const cylchain::LinkerSystem& system, const cylchain::ChainList& chains, bool periodic,
             bool nearestParticles);
-    bool setChains(ContextImpl& context, const cylchain::ChainList& chains,
+    bool setChains(ContextImpl&, const cylchain::ChainList& chains,
             const std::vector<cylchain::ChainCut>& cuts, cylchain::LinkerState& state, std::uint32_t seed, int force) {
-        return kinetics->setChains(chains, cuts, state, describeStep(context, 0, seed, force));
+        return kinetics->setChains(chains, cuts, state, describeStep(0, seed, force));
     }
     void setWalls(const std::vector<cylchain::Wall>& walls) {
         kinetics->setWalls(walls);
     }
-    bool placeFree(ContextImpl& context, cylchain::LinkerState& state, std::uint32_t seed, int force) {
-        return kinetics->placeFree(state, describeStep(context, 0, seed, force));
+    bool placeFree(ContextImpl&, cylchain::LinkerState& state, std::uint32_t seed, int force) {
+        return kinetics->placeFree(state, describeStep(0, seed, force));
     }
     long long execute(ContextImpl& context, cylchain::LinkerState& state, double kT, double stepSize,
             std::uint32_t seed, int force, std::vector<cylchain::Link>& links);
     void describe(const cylchain::LinkerState& state, std::vector<cylchain::Link>& links);
 private:
-    cylchain::KineticStep describeStep(ContextImpl& context, double stepSize, std::uint32_t seed, int force) const;
-    ReferenceParallelLoop loop;
+    cylchain::KineticStep describeStep(double stepSize, std::uint32_t seed, int force) const;
+    std::shared_ptr<HostParticles> particles;
     std::unique_ptr<cylchain::LinkerKinetics> kinetics;
     bool periodic, nearestParticles;
 };

@@ -1,5 +1,4 @@
 #include "ReferenceCalcCylinderChainContactForceKernel.h"
-#include "ReferenceContextData.h"
 #include "openmm/OpenMMException.h"
 #include <algorithm>
 #include <stdexcept>
@@ -21,8 +20,8 @@ struct ReferenceCalcCylinderChainContactForceKernel::Touching {
 };
 
 ReferenceCalcCylinderChainContactForceKernel::ReferenceCalcCylinderChainContactForceKernel(string name,
-        const Platform& platform, ContextImpl& context) : CalcCylinderChainContactForceKernel(name, platform),
-        loop(context), search(NULL), stiffness(0), skin(0), periodic(false), hasList(false), noted(NULL) {
+        const Platform& platform, shared_ptr<HostParticles> particles) :
+        CalcCylinderChainContactForceKernel(name, platform), host(particles), search(NULL), stiffness(0), skin(0), periodic(false), hasList(false), noted(NULL) {
 }
 
 void ReferenceCalcCylinderChainContactForceKernel::initialize(const System&, ContactSearch& search, double stiffness,
@@ -35,6 +34,7 @@ void ReferenceCalcCylinderChainContactForceKernel::initialize(const System&, Con
             particles.push_back(particle);
     sort(particles.begin(), particles.end());
     particles.erase(unique(particles.begin(), particles.end()), particles.end());
+    host->include(particles);
 }
 
 bool ReferenceCalcCylinderChainContactForceKernel::isListValid(const vector<Vec3>& positions, const Vec3* box) const {
@@ -59,7 +59,9 @@ void ReferenceCalcCylinderChainContactForceKernel::findPairs(vector<Vec3>& posit
     for (const Capsule& capsule : search->getSystem().capsules)
         diameter = max(diameter, 2*capsule.radius);
     hasList = false;
-    const Loop run = [&] (int count, const function<void(int)>& iteration) {loop.run(count, iteration);};
+    const Loop run = [&] (int count, const function<void(int)>& iteration) {
+        host->getLoop().run(count, iteration);
+    };
     // A box that is too small for a skin may be large enough for contacts.
 
     for (skin = SKIN*diameter; ; skin = 0)
@@ -78,17 +80,18 @@ void ReferenceCalcCylinderChainContactForceKernel::findPairs(vector<Vec3>& posit
     hasList = true;
 }
 
-double ReferenceCalcCylinderChainContactForceKernel::execute(ContextImpl& context, bool includeForces, bool) {
-    vector<Vec3>& positions = *extractData(context).positions;
-    Vec3* box = extractData(context).periodicBoxVectors;
+double ReferenceCalcCylinderChainContactForceKernel::execute(ContextImpl&, bool includeForces, bool) {
     if (particles.empty())
         return 0;
+    host->update();
+    vector<Vec3>& positions = host->getPositions();
+    Vec3* const box = host->getBox();
     if (!isListValid(positions, box))
         findPairs(positions, box);
     const double* x = &positions[0][0];
     const int chunks = (pairs.size()+CHUNK-1)/CHUNK;
     vector<vector<Touching> > touching(chunks);
-    loop.run(chunks, [&] (int chunk) {
+    host->getLoop().run(chunks, [&] (int chunk) {
         const int last = min((int) pairs.size(), (chunk+1)*CHUNK);
         for (int pair = chunk*CHUNK; pair < last; pair++) {
             Contact contacts[2];
@@ -100,9 +103,9 @@ double ReferenceCalcCylinderChainContactForceKernel::execute(ContextImpl& contex
 
     // Those that touch are few, so one thread adds their forces, in the order of pairs.
 
-    vector<Vec3>& forces = *extractData(context).forces;
     if (includeForces && noted != NULL)
         noted->clear();
+    vector<Vec3>& forces = host->beginForces();
     double energy = 0;
     for (const vector<Touching>& part : touching)
         for (const Touching& one : part) {
@@ -118,12 +121,13 @@ double ReferenceCalcCylinderChainContactForceKernel::execute(ContextImpl& contex
             if (noted != NULL)
                 noted->push_back(push);
         }
+    if (includeForces)
+        host->endForces();
     return energy;
 }
 
-bool ReferenceCalcCylinderChainContactForceKernel::notePushes(vector<Push>& pushes) {
+void ReferenceCalcCylinderChainContactForceKernel::notePushes(vector<Push>& pushes) {
     noted = &pushes;
-    return true;
 }
 
 void ReferenceCalcCylinderChainContactForceKernel::copyParametersToContext(ContextImpl&, double stiffness) {
@@ -131,9 +135,9 @@ void ReferenceCalcCylinderChainContactForceKernel::copyParametersToContext(Conte
     hasList = false;
 }
 
-ImplicitCouplings* ReferenceCalcCylinderChainContactForceKernel::getEquations(ContextImpl& context,
+ImplicitCouplings* ReferenceCalcCylinderChainContactForceKernel::getEquations(ContextImpl&,
         const vector<CapsuleOnCurve>& onCurves, const vector<CurveSite>& sites, CouplingImpulses& impulses) {
-    const double* box = periodic ? &extractData(context).periodicBoxVectors[0][0] : NULL;
+    const double* box = periodic ? &host->getBox()[0][0] : NULL;
     equations.setContacts({search, stiffness, box, &onCurves, &sites, &impulses});
     return &equations;
 }

@@ -1,17 +1,30 @@
 #include "ReferenceCalcCylinderChainForceKernel.h"
-#include "ReferenceContextData.h"
+#include "openmm/internal/ContextImpl.h"
 
 using namespace OpenMM;
 using namespace cylchain;
 using namespace std;
 
 ReferenceCalcCylinderChainForceKernel::ReferenceCalcCylinderChainForceKernel(string name, const Platform& platform,
-        ContextImpl& context) : CalcCylinderChainForceKernel(name, platform), loop(context), chains(NULL) {
+        shared_ptr<HostParticles> particles) : CalcCylinderChainForceKernel(name, platform), particles(particles), chains(NULL) {
 }
 
 void ReferenceCalcCylinderChainForceKernel::initialize(const System&, const CylinderChainDescription& chains) {
     this->chains = &chains;
     createEngines();
+    vector<vector<int> > molecules;
+    for (int chain = 0; chain < chains.getList().size(); chain++)
+        molecules.push_back(chains.getList().getParticles(chain));
+    for (size_t i = 0; i < chains.getChains().size(); i++) {
+        const vector<int>& spare = chains.getChains()[i].spareNodes;
+        vector<int>& own = molecules[chains.getList().getNumber(ChainKind::StraightSegments, i)];
+        own.insert(own.end(), spare.begin(), spare.end());
+    }
+    for (const RigidBody& body : chains.getBodies())
+        molecules.push_back(body.particles);
+    for (const vector<int>& molecule : molecules)
+        particles->include(molecule);
+    particles->addMolecules(molecules);
 }
 
 void ReferenceCalcCylinderChainForceKernel::createEngines() {
@@ -19,17 +32,16 @@ void ReferenceCalcCylinderChainForceKernel::createEngines() {
     beamEngine.reset(new BeamEngine(chains->getBeams(), chains->getChains().size()));
 }
 
-const double* ReferenceCalcCylinderChainForceKernel::getBox(ContextImpl& context) const {
-    return chains->usesPeriodicBoundaryConditions() ? &extractData(context).periodicBoxVectors[0][0] : NULL;
+const double* ReferenceCalcCylinderChainForceKernel::getBox() const {
+    return chains->usesPeriodicBoundaryConditions() ? &particles->getBox()[0][0] : NULL;
 }
 
-ChainEnergy ReferenceCalcCylinderChainForceKernel::addForces(ContextImpl& context, vector<Vec3>& forces,
-        bool includeEnergy) {
-    const double* positions = &(*extractData(context).positions)[0][0];
-    const double* box = getBox(context);
+ChainEnergy ReferenceCalcCylinderChainForceKernel::addForces(vector<Vec3>& forces, bool includeEnergy) {
+    const double* positions = &particles->getPositions()[0][0];
+    const double* box = getBox();
     const int numPacks = engine->getNumPacks();
     vector<ChainEnergy> energies(numPacks+beamEngine->getNumPacks());
-    loop.run(energies.size(), [&] (int pack) {
+    particles->getLoop().run(energies.size(), [&] (int pack) {
         energies[pack] = pack < numPacks ? engine->addForces(pack, positions, &forces[0][0], box, includeEnergy) :
                 beamEngine->addForces(pack-numPacks, positions, &forces[0][0], box, includeEnergy);
     });
@@ -46,16 +58,20 @@ ChainEnergy ReferenceCalcCylinderChainForceKernel::addForces(ContextImpl& contex
 }
 
 double ReferenceCalcCylinderChainForceKernel::execute(ContextImpl& context, bool includeForces, bool includeEnergy) {
+    particles->update();
     vector<Vec3> unused;
     if (!includeForces)
         unused.resize(context.getSystem().getNumParticles());
-    ChainEnergy energy = addForces(context, includeForces ? *extractData(context).forces : unused, includeEnergy);
+    const ChainEnergy energy = addForces(includeForces ? particles->beginForces() : unused, includeEnergy);
+    if (includeForces)
+        particles->endForces();
     return energy.stretching+energy.bending+energy.tethers;
 }
 
 void ReferenceCalcCylinderChainForceKernel::computeEnergies(ContextImpl& context, double& stretching, double& bending) {
+    particles->update();
     vector<Vec3> unused(context.getSystem().getNumParticles());
-    ChainEnergy energy = addForces(context, unused, true);
+    const ChainEnergy energy = addForces(unused, true);
     stretching = energy.stretching;
     bending = energy.bending;
 }

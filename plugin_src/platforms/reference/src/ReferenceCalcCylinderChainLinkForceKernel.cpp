@@ -1,5 +1,4 @@
 #include "ReferenceCalcCylinderChainLinkForceKernel.h"
-#include "ReferenceContextData.h"
 #include <algorithm>
 
 using namespace OpenMM;
@@ -12,8 +11,8 @@ using namespace std;
 static const int LINKS_OF_BLOCK = 1024;
 
 ReferenceCalcCylinderChainLinkForceKernel::ReferenceCalcCylinderChainLinkForceKernel(string name,
-        const Platform& platform, ContextImpl& context) : CalcCylinderChainLinkForceKernel(name, platform),
-        loop(context), periodic(false), nearestParticles(false) {
+        const Platform& platform, shared_ptr<HostParticles> particles) :
+        CalcCylinderChainLinkForceKernel(name, platform), particles(particles), periodic(false), nearestParticles(false) {
 }
 
 void ReferenceCalcCylinderChainLinkForceKernel::initialize(const System&, bool periodic, bool nearestParticles) {
@@ -21,28 +20,41 @@ void ReferenceCalcCylinderChainLinkForceKernel::initialize(const System&, bool p
     this->nearestParticles = nearestParticles;
 }
 
-LinkBoxes ReferenceCalcCylinderChainLinkForceKernel::getBoxes(ContextImpl& context) const {
-    const double* box = &extractData(context).periodicBoxVectors[0][0];
+LinkBoxes ReferenceCalcCylinderChainLinkForceKernel::getBoxes() const {
+    const double* box = &particles->getBox()[0][0];
     LinkBoxes boxes;
     boxes.distances = periodic ? box : NULL;
     boxes.segments = nearestParticles ? box : NULL;
     return boxes;
 }
 
-ImplicitCouplings* ReferenceCalcCylinderChainLinkForceKernel::getEquations(ContextImpl& context,
-        const vector<Link>& links) {
-    equations.setLinks(&links, getBoxes(context));
+/** Links may be others in each step, and their places are particles of any kind. */
+void ReferenceCalcCylinderChainLinkForceKernel::include(const vector<Link>& links) {
+    if (!particles->areCopies())
+        return;
+    vector<int> own;
+    for (const Link& link : links) {
+        addParticles(link.first, own);
+        addParticles(link.second, own);
+    }
+    particles->include(own);
+}
+
+ImplicitCouplings* ReferenceCalcCylinderChainLinkForceKernel::getEquations(ContextImpl&, const vector<Link>& links) {
+    include(links);
+    equations.setLinks(&links, getBoxes());
     return &equations;
 }
 
-double ReferenceCalcCylinderChainLinkForceKernel::execute(ContextImpl& context, const vector<Link>& links,
+double ReferenceCalcCylinderChainLinkForceKernel::execute(ContextImpl&, const vector<Link>& links,
         bool includeForces, bool, int& outOfRange) {
-    ReferencePlatform::PlatformData& data = extractData(context);
-    const double* positions = &(*data.positions)[0][0];
-    const LinkBoxes boxes = getBoxes(context);
+    include(links);
+    particles->update();
+    const double* positions = &particles->getPositions()[0][0];
+    const LinkBoxes boxes = getBoxes();
     const int count = links.size();
     pulls.resize(count);
-    loop.run((count+LINKS_OF_BLOCK-1)/LINKS_OF_BLOCK, [&] (int block) {
+    particles->getLoop().run((count+LINKS_OF_BLOCK-1)/LINKS_OF_BLOCK, [&] (int block) {
         const int end = min(count, (block+1)*LINKS_OF_BLOCK);
         for (int i = block*LINKS_OF_BLOCK; i < end; i++)
             pulls[i] = computePull(links[i], positions, boxes);
@@ -50,7 +62,7 @@ double ReferenceCalcCylinderChainLinkForceKernel::execute(ContextImpl& context, 
 
     // Sums do not depend on the order in which threads have finished.
 
-    double* forces = &(*data.forces)[0][0];
+    double* forces = &particles->beginForces()[0][0];
     double energy = 0;
     outOfRange = -1;
     for (int i = 0; i < count; i++) {
@@ -62,5 +74,7 @@ double ReferenceCalcCylinderChainLinkForceKernel::execute(ContextImpl& context, 
             addForce(links[i].second, pulls[i].force, 1, forces);
         }
     }
+    if (includeForces)
+        particles->endForces();
     return energy;
 }

@@ -5,6 +5,7 @@
 #include "ReferenceCalcCylinderChainWallForceKernel.h"
 #include "ReferenceIntegrateCylinderChainStepKernel.h"
 #include "ReferenceUpdateCylinderChainGrowthKernel.h"
+#include "ReferenceParticles.h"
 #include "ReferenceUpdateCylinderChainLinkersKernel.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/reference/ReferencePlatform.h"
@@ -20,32 +21,39 @@ extern "C" void registerKernelFactories() {
         Platform& platform = Platform::getPlatform(i);
         if (dynamic_cast<ReferencePlatform*>(&platform) != NULL) {
             ReferenceCylinderChainKernelFactory* factory = new ReferenceCylinderChainKernelFactory();
-            platform.registerKernelFactory(CalcCylinderChainForceKernel::Name(), factory);
-            platform.registerKernelFactory(CalcCylinderChainContactForceKernel::Name(), factory);
-            platform.registerKernelFactory(CalcCylinderChainLinkForceKernel::Name(), factory);
-            platform.registerKernelFactory(CalcCylinderChainWallForceKernel::Name(), factory);
-            platform.registerKernelFactory(UpdateCylinderChainGrowthKernel::Name(), factory);
-            platform.registerKernelFactory(UpdateCylinderChainLinkersKernel::Name(), factory);
-            platform.registerKernelFactory(IntegrateCylinderChainStepKernel::Name(), factory);
+            for (const string& kernel : getHostKernelNames())
+                platform.registerKernelFactory(kernel, factory);
         }
     }
 }
 
+vector<string> OpenMM::getHostKernelNames() {
+    return {CalcCylinderChainForceKernel::Name(), CalcCylinderChainContactForceKernel::Name(),
+            CalcCylinderChainLinkForceKernel::Name(), CalcCylinderChainWallForceKernel::Name(),
+            UpdateCylinderChainGrowthKernel::Name(), UpdateCylinderChainLinkersKernel::Name(),
+            IntegrateCylinderChainStepKernel::Name()};
+}
+
+KernelImpl* OpenMM::createHostKernel(const string& name, const Platform& platform,
+        const shared_ptr<HostParticles>& particles) {
+    if (name == CalcCylinderChainForceKernel::Name())
+        return new ReferenceCalcCylinderChainForceKernel(name, platform, particles);
+    if (name == CalcCylinderChainContactForceKernel::Name())
+        return new ReferenceCalcCylinderChainContactForceKernel(name, platform, particles);
+    if (name == CalcCylinderChainLinkForceKernel::Name())
+        return new ReferenceCalcCylinderChainLinkForceKernel(name, platform, particles);
+    if (name == CalcCylinderChainWallForceKernel::Name())
+        return new ReferenceCalcCylinderChainWallForceKernel(name, platform, particles);
+    if (name == UpdateCylinderChainGrowthKernel::Name())
+        return new ReferenceUpdateCylinderChainGrowthKernel(name, platform, particles);
+    if (name == UpdateCylinderChainLinkersKernel::Name())
+        return new ReferenceUpdateCylinderChainLinkersKernel(name, platform, particles);
+    if (name == IntegrateCylinderChainStepKernel::Name())
+        return new ReferenceIntegrateCylinderChainStepKernel(name, platform, particles);
+    throw OpenMMException("Tried to create kernel with illegal kernel name '"+name+"'");
+}
+
 KernelImpl* ReferenceCylinderChainKernelFactory::createKernelImpl(string name, const Platform& platform,
         ContextImpl& context) const {
-    if (name == CalcCylinderChainForceKernel::Name())
-        return new ReferenceCalcCylinderChainForceKernel(name, platform, context);
-    if (name == CalcCylinderChainContactForceKernel::Name())
-        return new ReferenceCalcCylinderChainContactForceKernel(name, platform, context);
-    if (name == CalcCylinderChainLinkForceKernel::Name())
-        return new ReferenceCalcCylinderChainLinkForceKernel(name, platform, context);
-    if (name == CalcCylinderChainWallForceKernel::Name())
-        return new ReferenceCalcCylinderChainWallForceKernel(name, platform);
-    if (name == UpdateCylinderChainGrowthKernel::Name())
-        return new ReferenceUpdateCylinderChainGrowthKernel(name, platform);
-    if (name == UpdateCylinderChainLinkersKernel::Name())
-        return new ReferenceUpdateCylinderChainLinkersKernel(name, platform, context);
-    if (name == IntegrateCylinderChainStepKernel::Name())
-        return new ReferenceIntegrateCylinderChainStepKernel(name, platform, context);
-    throw OpenMMException("Tried to create kernel with illegal kernel name '"+name+"'");
+    return createHostKernel(name, platform, make_shared<ReferenceParticles>(context));
 }

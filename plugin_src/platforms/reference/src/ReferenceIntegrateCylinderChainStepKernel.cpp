@@ -1,7 +1,6 @@
 #include "ReferenceIntegrateCylinderChainStepKernel.h"
-#include "ReferenceContextData.h"
 #include "lanes/Noise.h"
-#include "openmm/reference/ReferenceVirtualSites.h"
+#include "openmm/internal/ContextImpl.h"
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -20,8 +19,8 @@ static bool isFinite(const Vec3& v) {
 }
 
 ReferenceIntegrateCylinderChainStepKernel::ReferenceIntegrateCylinderChainStepKernel(string name,
-        const Platform& platform, ContextImpl& context) : IntegrateCylinderChainStepKernel(name, platform),
-        loop(context), chainKernel(NULL), others(NULL), versionOfNetwork(-1), versionOfLengths(-1), mixedChains(0) {
+        const Platform& platform, shared_ptr<HostParticles> particles) :
+        IntegrateCylinderChainStepKernel(name, platform), particles(particles), chainKernel(NULL), others(NULL), versionOfNetwork(-1), versionOfLengths(-1), mixedChains(0) {
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system, const CylinderChainDescription&,
@@ -30,27 +29,27 @@ void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system,
 
     chainKernel = &dynamic_cast<ReferenceCalcCylinderChainForceKernel&>(forceKernel);
     this->others = &others;
+    particles->beginSteps();
     mixedChains = 0;
     displacements.assign(system.getNumParticles(), Vec3());
     newPositions.assign(system.getNumParticles(), Vec3());
 }
 
-const vector<Vec3>& ReferenceIntegrateCylinderChainStepKernel::getForces(ContextImpl& context) {
-    return *extractData(context).forces;
+const vector<Vec3>& ReferenceIntegrateCylinderChainStepKernel::getForces(ContextImpl&) {
+    particles->update();
+    return particles->getForces();
 }
 
-Instability ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImpl& context,
-        const StepSettings& settings) {
-    ReferencePlatform::PlatformData& data = extractData(context);
+Instability ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImpl&, const StepSettings& settings) {
     const ChainEngine& engine = chainKernel->getEngine();
-    const double* positions = &(*data.positions)[0][0];
-    const double* forces = &(*data.forces)[0][0];
-    const double* box = chainKernel->getBox(context);
+    const double* positions = &particles->getPositions()[0][0];
+    const double* forces = &particles->getForces()[0][0];
+    const double* box = chainKernel->getBox();
     const vector<int> packs = engine.getPacksOfStep(settings);
     const BeamEngine& beams = chainKernel->getBeamEngine();
     const int numPacks = packs.size(), numChains = chainKernel->getChains().size();
     vector<Instability> instabilities(numPacks+beams.getNumPacks());
-    loop.run(instabilities.size(), [&] (int i) {
+    particles->getLoop().run(instabilities.size(), [&] (int i) {
         const bool ofBeams = i >= numPacks;
         const int pack = ofBeams ? i-numPacks : packs[i];
         instabilities[i] = ofBeams ? beams.step(pack, positions, forces, box, settings, &displacements[0][0]) :
@@ -58,8 +57,7 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImp
         // Beams count as further chains.
         if (ofBeams && instabilities[i].chain != -1)
             instabilities[i].chain += numChains;
-        for (int particle : ofBeams ? beams.getParticles(pack) : engine.getParticles(pack))
-            findNewPosition(context, particle, settings.stepSize);
+        findNewPositions(ofBeams ? beams.getParticles(pack) : engine.getParticles(pack), settings.stepSize);
     });
 
     // Whatever the order of packs, report the first chain.
@@ -75,15 +73,18 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImp
     return result;
 }
 
-void ReferenceIntegrateCylinderChainStepKernel::findNewPosition(ContextImpl& context, int particle, double stepSize) {
-    ReferencePlatform::PlatformData& data = extractData(context);
-    newPositions[particle] = (*data.positions)[particle]+displacements[particle];
-    (*data.velocities)[particle] = displacements[particle]/stepSize;
+template <class Particles> void ReferenceIntegrateCylinderChainStepKernel::findNewPositions(const Particles& own,
+        double stepSize) {
+    const vector<Vec3>& positions = particles->getPositions();
+    vector<Vec3>& velocities = particles->getVelocities();
+    for (int particle : own) {
+        newPositions[particle] = positions[particle]+displacements[particle];
+        velocities[particle] = displacements[particle]/stepSize;
+    }
 }
 
 Instability ReferenceIntegrateCylinderChainStepKernel::displaceCoupledChains(ContextImpl& context,
         const StepSettings& settings, const CoupledForces& coupled) {
-    ReferencePlatform::PlatformData& data = extractData(context);
     const ChainEngine& engine = chainKernel->getEngine();
     const BeamEngine& beams = chainKernel->getBeamEngine();
     if (!network || versionOfNetwork != chainKernel->getEngineVersion()) {
@@ -96,38 +97,42 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceCoupledChains(Con
     versionOfLengths = chainKernel->getVersionOfLengths();
     network->setForces(coupled);
     Instability result;
-    loop.runMany([&] (const Loop& loops) {
-        result = network->step(&(*data.positions)[0][0], &(*data.forces)[0][0], chainKernel->getBox(context), settings,
-                &displacements[0][0], loops);
+    particles->getLoop().runMany([&] (const Loop& loops) {
+        result = network->step(&particles->getPositions()[0][0], &particles->getForces()[0][0], chainKernel->getBox(),
+                settings, &displacements[0][0], loops);
     });
     if (result.chain != -1)
         return result;
     const vector<int> packs = engine.getPacksOfStep(settings);
     for (int pack : packs)
-        for (int particle : engine.getParticles(pack))
-            findNewPosition(context, particle, settings.stepSize);
+        findNewPositions(engine.getParticles(pack), settings.stepSize);
     for (int pack = 0; pack < beams.getNumPacks(); pack++)
-        for (int particle : beams.getParticles(pack))
-            findNewPosition(context, particle, settings.stepSize);
+        findNewPositions(beams.getParticles(pack), settings.stepSize);
     for (const RigidBody& body : others->getBodies())
-        for (int particle : body.particles)
-            findNewPosition(context, particle, settings.stepSize);
+        findNewPositions(body.particles, settings.stepSize);
     mixedChains = engine.getNumMixedChains(packs);
     return result;
 }
 
-void ReferenceIntegrateCylinderChainStepKernel::displaceOthers(ContextImpl& context, const StepSettings& settings,
+void ReferenceIntegrateCylinderChainStepKernel::displaceOthers(ContextImpl&, const StepSettings& settings,
         double friction) {
-    const vector<int>& mobile = others->getMobile();
-    const vector<Vec3>& forces = *extractData(context).forces;
+    particles->update();
+    if (versionOfMobile != particles->getVersion()) {
+        mobile.clear();
+        for (int particle : others->getMobile())
+            if (particles->includes(particle))
+                mobile.push_back(particle);
+        versionOfMobile = particles->getVersion();
+    }
+    particles->displaceOthers(*others, settings, friction);
     const int numBlocks = (mobile.size()+PARTICLES_OF_BLOCK-1)/PARTICLES_OF_BLOCK;
-    loop.run(numBlocks, [&] (int block) {
-        displaceBlock(block, *extractData(context).positions, forces, settings, friction);
+    particles->getLoop().run(numBlocks, [&] (int block) {
+        displaceBlock(block, settings, friction);
     });
     const auto found = find_if(mobile.begin(), mobile.end(), [&] (int particle) {
         return !isFinite(displacements[particle]);
     });
-    unstableParticle = (found == mobile.end() ? -1 : *found);
+    unstableParticle = (found == mobile.end() ? particles->findUnstable() : *found);
 }
 
 static Vec3 velocityOf(const BackgroundFlow& flow, const Vec3& x) {
@@ -137,17 +142,18 @@ static Vec3 velocityOf(const BackgroundFlow& flow, const Vec3& x) {
     return {velocity[0], velocity[1], velocity[2]};
 }
 
-void ReferenceIntegrateCylinderChainStepKernel::displaceBlock(int block, const vector<Vec3>& positions,
-        const vector<Vec3>& forces, const StepSettings& settings, double friction) {
-    const vector<int>& mobile = others->getMobile();
+void ReferenceIntegrateCylinderChainStepKernel::displaceBlock(int block, const StepSettings& settings,
+        double friction) {
+    const vector<Vec3>& positions = particles->getPositions();
+    const vector<Vec3>& forces = particles->getForces();
     const int start = block*PARTICLES_OF_BLOCK;
     const int end = min((int) mobile.size(), start+PARTICLES_OF_BLOCK);
     const uint32_t noChains[PARTICLES_OF_BLOCK] = {};
-    uint32_t particles[PARTICLES_OF_BLOCK];
+    uint32_t numbers[PARTICLES_OF_BLOCK];
     double gaussian[4*PARTICLES_OF_BLOCK];
-    copy(mobile.begin()+start, mobile.begin()+end, particles);
+    copy(mobile.begin()+start, mobile.begin()+end, numbers);
     drawNormals({(uint32_t) settings.seed, (uint32_t) settings.level, settings.step}, NoiseKind::Particle, noChains,
-            particles, end-start, gaussian);
+            numbers, end-start, gaussian);
     for (int i = start; i < end; i++) {
         const int particle = mobile[i];
         const double mobility = others->getMobility(particle, friction);
@@ -163,54 +169,48 @@ void ReferenceIntegrateCylinderChainStepKernel::displaceBlock(int block, const v
     }
 }
 
-void ReferenceIntegrateCylinderChainStepKernel::move(ContextImpl& context, const StepSettings& settings) {
-    ReferencePlatform::PlatformData& data = extractData(context);
+void ReferenceIntegrateCylinderChainStepKernel::move(ContextImpl&, const StepSettings& settings) {
+    const vector<Vec3>& positions = particles->getPositions();
     for (int particle : others->getParticles())
-        newPositions[particle] = (*data.positions)[particle]+displacements[particle];
-    for (int particle : others->getMobile())
-        (*data.velocities)[particle] = displacements[particle]/settings.stepSize;
-    exchangePositions(context, settings.stepSize, 1);
+        newPositions[particle] = positions[particle]+displacements[particle];
+    vector<Vec3>& velocities = particles->getVelocities();
+    for (int particle : mobile)
+        velocities[particle] = displacements[particle]/settings.stepSize;
+    finishSteps(settings.stepSize, 1);
 }
 
-void ReferenceIntegrateCylinderChainStepKernel::exchangePositions(ContextImpl& context, double time, int steps) {
-    ReferencePlatform::PlatformData& data = extractData(context);
+void ReferenceIntegrateCylinderChainStepKernel::finishSteps(double stepSize, int steps) {
     for (const Chain& chain : chainKernel->getChains())
         for (int spare : chain.spareNodes)
-            newPositions[spare] = chain.nodes.empty() ? (*data.positions)[spare] : newPositions[chain.nodes.back()];
-    data.positions->swap(newPositions);
-#if CYLCHAIN_OPENMM_VERSION >= 804
-    data.virtualSites->computePositions(context.getSystem(), *data.positions, data.periodicBoxVectors);
-#else
-    data.virtualSites->computePositions(context.getSystem(), *data.positions);
-#endif
-    data.time += time;
-    data.stepCount += steps;
+            newPositions[spare] = chain.nodes.empty() ? particles->getPositions()[spare] :
+                    newPositions[chain.nodes.back()];
+    particles->move(newPositions, stepSize, steps);
 }
 
-int ReferenceIntegrateCylinderChainStepKernel::advanceChains(ContextImpl& context, const StepSettings& settings,
-        int count, long long& divided) {
+int ReferenceIntegrateCylinderChainStepKernel::advanceChains(ContextImpl&, const StepSettings& settings, int count,
+        long long& divided) {
+    particles->update();
     const ChainEngine& engine = chainKernel->getEngine();
     const BeamEngine& beams = chainKernel->getBeamEngine();
     const vector<int> packs = engine.getPacksOfStep(settings);
     const int numPacks = packs.size();
     vector<int> taken(numPacks+beams.getNumPacks());
     vector<long long> dividedInPack(taken.size());
-    loop.run(taken.size(), [&] (int i) {
-        taken[i] = i < numPacks ? advancePack(context, engine, packs[i], settings, count, dividedInPack[i]) :
-                advancePack(context, beams, i-numPacks, settings, count, dividedInPack[i]);
+    particles->getLoop().run(taken.size(), [&] (int i) {
+        taken[i] = i < numPacks ? advancePack(engine, packs[i], settings, count, dividedInPack[i]) :
+                advancePack(beams, i-numPacks, settings, count, dividedInPack[i]);
     });
     divided = accumulate(dividedInPack.begin(), dividedInPack.end(), 0LL);
     return *min_element(taken.begin(), taken.end());
 }
 
-template <class Engine> int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context,
-        const Engine& engine, int pack, StepSettings settings, int count, long long& divided) {
-    ReferencePlatform::PlatformData& data = extractData(context);
-    const double* box = chainKernel->getBox(context);
-    double* forces = &(*data.forces)[0][0];
-    const ParticleRange particles = engine.getParticles(pack);
-    for (int particle : particles)
-        newPositions[particle] = (*data.positions)[particle];
+template <class Engine> int ReferenceIntegrateCylinderChainStepKernel::advancePack(const Engine& engine, int pack, StepSettings settings, int count, long long& divided) {
+    const double* box = chainKernel->getBox();
+    double* forces = &particles->getForces()[0][0];
+    const ParticleRange own = engine.getParticles(pack);
+    const vector<Vec3>& positionsBefore = particles->getPositions();
+    for (int particle : own)
+        newPositions[particle] = positionsBefore[particle];
     engine.clearForces(pack, forces);
     vector<vector<SegmentForces> >* const segmentForces = settings.segmentForces;
     for (int done = 0; done < count; done++, settings.step++) {
@@ -224,21 +224,24 @@ template <class Engine> int ReferenceIntegrateCylinderChainStepKernel::advancePa
         if (instability.chain != -1)
             return done;
         divided += instability.divided;
-        for (int particle : particles)
+        for (int particle : own)
             newPositions[particle] += displacements[particle];
+        if (particles->areCopies())
+            for (int particle : own)
+                newPositions[particle] = particles->store(particle, newPositions[particle]);
     }
-    for (int particle : particles)
+    vector<Vec3>& velocities = particles->getVelocities();
+    for (int particle : own)
         if (count > 0)
-            (*data.velocities)[particle] = displacements[particle]/settings.stepSize;
+            velocities[particle] = displacements[particle]/settings.stepSize;
     return count;
 }
 
-void ReferenceIntegrateCylinderChainStepKernel::moveAdvanced(ContextImpl& context, const StepSettings& settings,
-        int count) {
-    ReferencePlatform::PlatformData& data = extractData(context);
+void ReferenceIntegrateCylinderChainStepKernel::moveAdvanced(ContextImpl&, const StepSettings& settings, int count) {
+    const vector<Vec3>& positions = particles->getPositions();
     for (int particle : others->getParticles())
-        newPositions[particle] = (*data.positions)[particle];
-    exchangePositions(context, count*settings.stepSize, count);
+        newPositions[particle] = positions[particle];
+    finishSteps(settings.stepSize, count);
     const ChainEngine& engine = chainKernel->getEngine();
     if (count > 0)
         mixedChains = engine.getNumMixedChains(engine.getPacksOfStep(settings), settings);

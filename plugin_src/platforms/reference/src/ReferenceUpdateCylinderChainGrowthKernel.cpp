@@ -1,5 +1,4 @@
 #include "ReferenceUpdateCylinderChainGrowthKernel.h"
-#include "ReferenceContextData.h"
 
 using namespace OpenMM;
 using namespace cylchain;
@@ -10,17 +9,27 @@ void ReferenceUpdateCylinderChainGrowthKernel::initialize(const GrowthSystem& sy
     growth = make_unique<ChainGrowth>(system, bending, stretching, planar);
 }
 
-GrowthChanges ReferenceUpdateCylinderChainGrowthKernel::execute(ContextImpl& context, GrowthState& state,
+GrowthChanges ReferenceUpdateCylinderChainGrowthKernel::execute(ContextImpl&, GrowthState& state,
         GrowthStep step, bool periodic, ChainList& chains, const vector<Surroundings*>& around) {
-    ReferencePlatform::PlatformData& data = extractData(context);
-    step.box = &data.periodicBoxVectors[0][0];
+    particles->update();
+    step.box = &particles->getBox()[0][0];
     step.takesNearestImages = periodic;
-    return growth->advance(state, step, chains, &(*data.positions)[0][0], around);
+    GrowthChanges changes = growth->advance(state, step, chains, &particles->getPositions()[0][0], around);
+    if (!changes.chains.empty())
+        particles->writePositions();
+    return changes;
 }
 
-void ReferenceUpdateCylinderChainGrowthKernel::placeSpareNodes(ContextImpl& context, const vector<Chain>& chains) {
-    vector<Vec3>& positions = *extractData(context).positions;
+void ReferenceUpdateCylinderChainGrowthKernel::placeSpareNodes(ContextImpl&, const vector<Chain>& chains) {
+    particles->update();
+    vector<Vec3>& positions = particles->getPositions();
+    bool anyMoves = false;
     for (const Chain& chain : chains)
-        for (int spare : chain.spareNodes)
-            positions[spare] = positions[chain.nodes.empty() ? chain.spareNodes[0] : chain.nodes.back()];
+        for (int spare : chain.spareNodes) {
+            const Vec3& place = positions[chain.nodes.empty() ? chain.spareNodes[0] : chain.nodes.back()];
+            anyMoves |= positions[spare] != place;
+            positions[spare] = place;
+        }
+    if (anyMoves)
+        particles->writePositions();
 }

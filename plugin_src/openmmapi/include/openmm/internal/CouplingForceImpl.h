@@ -45,7 +45,7 @@ public:
      */
     virtual bool hasForces() = 0;
     /**
-     * Get the equations that it has in an implicit step; NULL if the platform has none.
+     * Get the equations that it has in an implicit step.
      */
     virtual cylchain::ImplicitCouplings* getEquations(ContextImpl& context) = 0;
     /**

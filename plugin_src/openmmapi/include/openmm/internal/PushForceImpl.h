@@ -19,8 +19,6 @@ public:
         impulses.beginStep();
     }
     void finishStep(bool taken, bool acts, double stepSize) {
-        if (!taken && acts && !notesPushes)
-            return;
         if (!taken && acts)
             for (const cylchain::Push& push : present)
                 impulses.add(push, stepSize);
@@ -65,10 +63,9 @@ protected:
      */
     virtual void findPushes(ContextImpl& context, std::vector<cylchain::Push>& pushes) const = 0;
     /**
-     * The forces where the kernel has computed them last, if it takes note of them.
+     * The forces as the kernel has computed them last.
      */
     std::vector<cylchain::Push> present;
-    bool notesPushes = false;
     // Of parameters, which updateParametersInContext() changes.
 
     int versionOfSurroundings = 0;
