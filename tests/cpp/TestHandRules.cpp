@@ -7,6 +7,9 @@
 #include <functional>
 #include <random>
 
+/** Of unbound linkers: so small that about as many of them hold nothing, one rod, and two. */
+const double VOLUME = 1e8;
+
 /** The weights of what a linker may hold, against nothing: by sums over places that a rule for pairs allows. */
 struct Weights {
     double first = 0, second = 0, both = 0;
@@ -52,7 +55,7 @@ static Weights weightsOn(const Rods& rods, const LinkerSystem& system, double vo
 static void checkWeights(const Rods& rods, const LinkerSystem& system, double stepSize, const Weights& weights,
         const string& what) {
     KineticStep step = stepOf(rods.x, stepSize);
-    step.volume = 1.2e9;
+    step.volume = VOLUME;
     LinkerKinetics kinetics(system, rods.chains);
     LinkerState state = freeLinkers(1000);
     const int interval = max(1, (int) (2/stepSize));
@@ -60,7 +63,7 @@ static void checkWeights(const Rods& rods, const LinkerSystem& system, double st
         kinetics.advance(state, step, SERIAL);
     Mean first, second, both;
     for (int block = 0; block < 20; block++) {
-        for (int sample = 0; sample < 4; sample++) {
+        for (int sample = 0; sample < 5; sample++) {
             for (int i = 0; i < interval; i++)
                 kinetics.advance(state, step, SERIAL);
             for (const Linker& linker : state.linkers) {
@@ -94,17 +97,20 @@ static Rods fourRods() {
     return rods;
 }
 
-static LinkerSystem fourSystem() {
+/** Fewer proposals than twoHands() has take less time. */
+static LinkerSystem weakHands(const vector<int>& chains) {
     LinkerSystem system = twoHands(0.05, 10, 70, 70, 0.4);
-    for (Hand& hand : system.hands)
-        hand.chains = {0, 1, 2, 3};
+    for (Hand& hand : system.hands) {
+        hand.chains = chains;
+        hand.bindingRate *= 0.2;
+    }
     return system;
 }
 
 /** With steps over a factor of a hundred. */
 static void testAngles() {
     const Rods rods = fourRods();
-    LinkerSystem system = fourSystem();
+    LinkerSystem system = weakHands({0, 1, 2, 3});
     // Cosines of the rods: with the first and the second one, the third is antiparallel; the fourth is across to all.
     auto kindOf = [] (int i, int j) {
         return i == 3 || j == 3 ? 0 : (i == 2) == (j == 2) ? 1 : -1;
@@ -116,27 +122,27 @@ static void testAngles() {
         system.types[0].largestCosine = window[1];
         // Where chains stand still, it makes no difference.
         system.types[0].reversible = number%2 == 0;
-        const Weights weights = weightsOn(rods, system, 1.2e9, [&] (int i, double, int j, double) {
+        const Weights weights = weightsOn(rods, system, VOLUME, [&] (int i, double, int j, double) {
             return kindOf(i, j) >= window[0] && kindOf(i, j) <= window[1];
         });
-        checkWeights(rods, system, number%2 == 0 ? 0.1 : 10, weights, "angles");
+        checkWeights(rods, system, number%2 == 0 ? 0.03 : 3, weights, "angles");
         number++;
     }
 }
 
 static void testTransActivation() {
     const Rods rods = fourRods();
-    LinkerSystem system = fourSystem();
+    LinkerSystem system = weakHands({0, 1, 2, 3});
     system.types[0].transActivated = true;
-    const Weights weights = weightsOn(rods, system, 1.2e9, [] (int, double, int, double) {return true;});
-    for (double stepSize : {0.1, 10.0})
+    const Weights weights = weightsOn(rods, system, VOLUME, [] (int, double, int, double) {return true;});
+    for (double stepSize : {0.03, 3.0})
         checkWeights(rods, system, stepSize, weights, "trans-activation");
     // The first hand may unbind before the second one then.
     system.types[0].reversible = false;
     LinkerKinetics kinetics(system, rods.chains);
     LinkerState state = freeLinkers(1000);
     KineticStep step = stepOf(rods.x, 0.1);
-    step.volume = 1.2e9;
+    step.volume = VOLUME;
     int alone = 0;
     for (int i = 0; i < 500; i++) {
         kinetics.advance(state, step, SERIAL);
@@ -232,13 +238,13 @@ static void testRanges() {
     for (int end : {-1, 0, 1, 2})
         for (bool excluded : {false, true})
             for (double diffusion : {-1.0, 1e6}) {
-                LinkerSystem system = twoHands(0.05, 10, 70, 70, 0);
+                LinkerSystem system = weakHands({0, 1});
                 for (Hand& hand : system.hands)
                     hand.bindingRange = {end, 30, excluded};
                 if (end < 0)
                     system.hands[1].bindingRange = {1, 30, excluded};
                 KineticStep step = stepOf(rods.x, 0.5);
-                step.volume = 1.2e9;
+                step.volume = VOLUME;
                 const double edge = cbrt(step.volume), box[] = {edge, 0, 0, 0, edge, 0, 0, 0, edge};
                 auto isIn = [&] (const BindingRange& own, double s) {
                     const bool isNear = (s <= 30 && own.end != 1) || (s >= 70 && own.end > 0);
@@ -252,7 +258,7 @@ static void testRanges() {
                 LinkerState state = freeLinkers(500);
                 check(kinetics.placeFree(state, step), "no room");
                 int joined = 0, bound = 0;
-                for (int i = 0; i < 200; i++) {
+                for (int i = 0; i < 60; i++) {
                     kinetics.advance(state, step, SERIAL);
                     for (const Linker& linker : state.linkers) {
                         joined += linker.pulls();
@@ -267,17 +273,17 @@ static void testRanges() {
                 check(bound > 1000 && joined > 100, "few are bound");
             }
     // How many, by their weights.
-    LinkerSystem system = twoHands(0.05, 10, 70, 70, 0.2);
+    LinkerSystem system = weakHands({0, 1});
     system.hands[0].bindingRange = {2, 20, true};
-    system.hands[1].bindingRange = {1, 25, false};
+    system.hands[1].bindingRange = {1, 50, false};
     auto isInOne = [] (double s) {return s >= 20 && s <= 80;};
-    auto isInTwo = [] (double s) {return s >= 75;};
-    Weights weights = weightsOn(rods, system, 1.2e9, [&] (int, double s, int, double t) {
+    auto isInTwo = [] (double s) {return s >= 50;};
+    Weights weights = weightsOn(rods, system, VOLUME, [&] (int, double s, int, double t) {
         return isInOne(s) && isInTwo(t);
     });
     weights.first *= 0.6;
-    weights.second *= 0.25;
-    for (double stepSize : {0.1, 10.0})
+    weights.second *= 0.5;
+    for (double stepSize : {0.03, 3.0})
         checkWeights(rods, system, stepSize, weights, "ranges");
 }
 
