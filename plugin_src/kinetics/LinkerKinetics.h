@@ -168,10 +168,11 @@ private:
     double pull(const Linker& linker, int side, const Spring& spring, const KineticStep& step, double& stiffness) const;
     double speedUnder(const Hand& hand, double pull) const;
     void slide(Linker& linker, const KineticStep& step, RandomNumbers& random, Count& count) const;
-    void slideHand(Linker& linker, int side, const KineticStep& step, double duration, RandomNumbers& random,
-            Count& count) const;
+    void slideHand(Linker& linker, int side, const KineticStep& step, double duration, bool isShort,
+            RandomNumbers& random, Count& count) const;
     void slideFreely(HandPlace& place, double move, bool isHeld) const;
-    Slope slopeAt(const Linker& linker, int side, const KineticStep& step, double duration) const;
+    Slope slopeAt(const Linker& linker, int side, const KineticStep& step, double duration,
+            bool isShort) const;
     void walk(Linker& linker, const KineticStep& step, Count& count) const;
     void walkPart(Linker& linker, const KineticStep& step, double duration, Count& count) const;
     bool draw(LinkerState& state, const KineticStep& step, Pending& next) const;

@@ -63,7 +63,7 @@ static void checkWeights(const Rods& rods, const LinkerSystem& system, double st
         kinetics.advance(state, step, SERIAL);
     Mean first, second, both;
     for (int block = 0; block < 20; block++) {
-        for (int sample = 0; sample < 5; sample++) {
+        for (int sample = 0; sample < 8; sample++) {
             for (int i = 0; i < interval; i++)
                 kinetics.advance(state, step, SERIAL);
             for (const Linker& linker : state.linkers) {

@@ -53,7 +53,7 @@ def test_presets_and_descriptions_are_read():
     assert second.kind.hands[1] == hand
     assert (second.kind.name, second.kind.rest_length, second.kind.same_filament) == ("motor", 30.0, False)
     assert second.kind.stiffness == pytest.approx(0.1 * PN)
-    assert (hand.reach, hand.binds_to, hand.at_end) == (60.0, None, "release")
+    assert (hand.reach, hand.binds_to, hand.holds_at_ends) == (60.0, None, False)
     assert hand.binding_rate == pytest.approx(1e-7) and hand.speed == pytest.approx(-5e-10)
     assert hand.stall_force == pytest.approx(4 * PN)
     assert configuration.filaments[0].linked
