@@ -121,10 +121,10 @@ def _read_cutting(hand, settings):
 def _read_ends(translation, hand, settings):
     tracks = settings.text("activity") == "track"
     end = settings.text("bind_only_end", "bind_end", default="off")
-    tracked = settings.text("track_end", default=end) if tracks else "off"
+    tracked = settings.text("track_end", default="off") if tracks else "off"
     if settings.text("bind_also_end", "bind_also_ends") not in OFF:
         hand.note(EXACT, "it binds at ends as well, as all of ours do", settings.line_of("bind_also_end"))
-    if end not in OFF or tracks:
+    if end not in OFF or tracked not in OFF:
         _bind_near(translation, hand, settings, end, tracked)
     forward = not hand.table.get("speed", "0").startswith("-")
     holds = settings.number(("hold_growing_end", 0 if forward else 1), "hold_growing_ends", default=0.0)
@@ -139,7 +139,7 @@ def _bind_near(translation, hand, settings, end, tracked):
     reach = settings.number("bind_end_range", ("bind_only_end", 1), ("bind_end", 1), default=0.0)
     line = settings.line_of("bind_only_end")
     alone = settings.flag("bind_only_free_end", default=False)
-    if end in _RANGES and tracked == "off" and not alone and "sliding_friction" not in hand.table:
+    if end in _RANGES and tracked in OFF and not alone and "sliding_friction" not in hand.table:
         near = {"end": _RANGES[end], "range": quantity(max(reach, _LEAST_REACH), "um")}
         hand.table["binding_range"] = near
         hand.note(EXACT if reach >= _LEAST_REACH else NEAREST, "bind_only_end", line)

@@ -115,7 +115,7 @@ static void testAngles() {
     auto kindOf = [] (int i, int j) {
         return i == 3 || j == 3 ? 0 : (i == 2) == (j == 2) ? 1 : -1;
     };
-    const double windows[][2] = {{0.5, 1}, {-1, -0.5}, {-0.7, 0.7}, {-1, 0.5}, {1, 1}};
+    const double windows[][2] = {{0.5, 1}, {-1, -0.5}, {-0.7, 0.7}};
     int number = 0;
     for (const double* window : windows) {
         system.types[0].leastCosine = window[0];
@@ -154,9 +154,9 @@ static void testTransActivation() {
 
 /** Two rods, one of which turns about its middle, by Monte Carlo moves: what there is has the weights of all states. */
 static void testTurning() {
-    const int number = 4;
-    LinkerSystem system = twoHands(0.006, 0, 300, 300, 0.3);
-    const double volume = 2e11;
+    const int number = 6;
+    LinkerSystem system = twoHands(0.003, 0, 300, 300, 0.3);
+    const double volume = 4e11;
     Rods rods;
     const double a[] = {-50, 0, 0}, b[] = {-50, 0, 20};
     rods.add(a, ALONG_X, 1, 100);
@@ -169,7 +169,7 @@ static void testTurning() {
         }
     };
     auto everywhere = [] (int, double, int, double) {return true;};
-    // By quadrature: the mean cosine, and how many linkers join both rods, at angles within the rule and beyond.
+    // By quadrature: the mean squared cosine, and how many linkers join both rods, at angles within the rule and beyond.
     double norm = 0, cosine = 0, within = 0, beyond = 0;
     const int points = 60;
     for (int i = 0; i < points; i++) {
@@ -178,10 +178,10 @@ static void testTurning() {
         const Weights weights = weightsOn(rods, system, volume, everywhere, 60);
         const double weight = pow(weights.all(), number), share = weights.both/weights.all();
         norm += weight;
-        cosine += weight*cos(2*angle);
-        (cos(angle) >= 0.5 ? within : beyond) += weight*share;
+        cosine += weight*cos(angle)*cos(angle);
+        (cos(angle) >= 0.2 ? within : beyond) += weight*share;
     }
-    system.types[0].leastCosine = 0.5;
+    system.types[0].leastCosine = 0.2;
     const Contours contours(rods.chains);
     LinkerKinetics kinetics(system, rods.chains);
     LinkerState state = freeLinkers(number);
@@ -204,22 +204,22 @@ static void testTurning() {
     };
     Mean found, foundWithin, foundBeyond;
     for (int block = 0; block < 20; block++) {
-        for (int i = 0; i < 6000; i++) {
+        for (int i = 0; i < 8000; i++) {
             for (int move = 0; move < 2; move++) {
-                const double before = energyAt(angle), changed = angle+2*(2*uniform(generator)-1);
+                const double before = energyAt(angle), changed = angle+M_PI*(2*uniform(generator)-1);
                 if (uniform(generator) < exp((before-energyAt(changed))/KT))
                     angle = changed;
             }
             turn(angle);
-            KineticStep step = stepOf(rods.x, 1);
+            KineticStep step = stepOf(rods.x, 4);
             step.volume = volume;
             kinetics.advance(state, step, SERIAL);
-            found.add(cos(2*angle));
+            found.add(cos(angle)*cos(angle));
             const double share = count_if(state.linkers.begin(), state.linkers.end(), [] (const Linker& linker) {
                 return linker.pulls();
             })/(double) number;
-            foundWithin.add(cos(angle) >= 0.5 ? share : 0);
-            foundBeyond.add(cos(angle) >= 0.5 ? 0 : share);
+            foundWithin.add(cos(angle) >= 0.2 ? share : 0);
+            foundBeyond.add(cos(angle) >= 0.2 ? 0 : share);
         }
         for (Mean* mean : {&found, &foundWithin, &foundBeyond})
             mean->endBlock();

@@ -90,13 +90,15 @@ def test_hands_that_cut(tmp_path):
 
 
 def test_hands_at_ends(tmp_path):
-    track = "activity = track; bind_only_end = plus_end, 0.5"
+    track = "activity = track; track_end = plus_end; bind_only_end = plus_end, 0.5"
     found, document = translated(tmp_path, single(track))
     own = found.linkers[0].kind.hands[0].filament_end
     assert (own.end, own.range, own.binds_there, own.tracks) == ("plus", 500.0, True, True)
     assert document.missing == []
     for options in ({}, {"fiber": TUBE, "made": ""}):
-        found, document = translated(tmp_path, single("bind_only_end = both_ends; bind_end_range = 0.01", **options))
+        found, document = translated(
+            tmp_path, single("bind_only_end = both_ends; bind_end_range = 0.01; activity = track", **options)
+        )
         own = found.linkers[0].kind.hands[0].binding_range
         assert (own.end, own.range, own.excluded) == ("both", 10.0, False) and document.missing == []
     found, document = translated(tmp_path, single("hold_shrinking_end = 1"))

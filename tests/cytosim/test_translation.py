@@ -137,7 +137,7 @@ def test_what_couples_cannot_do_here_is_said(tmp_path, couple, missing):
 @pytest.mark.parametrize(
     ("hand", "missing"),
     [
-        ("activity = track", "hands near ends"),
+        ("activity = track; track_end = plus_end", "hands near ends"),
         ("activity = slide; diffusion = 3", "hands that diffuse alone"),
         ("activity = nucleate; nucleate = 1, tube", "hands: nucleate"),
     ],
