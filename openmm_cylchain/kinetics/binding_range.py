@@ -50,4 +50,4 @@ class BindingRange:
             near |= np.asarray(along) <= self.range
         if self.end != "minus":
             near |= np.asarray(length) - along <= self.range
-        return (near & ~np.asarray(closed)) != self.excluded
+        return (near & np.logical_not(closed)) != self.excluded

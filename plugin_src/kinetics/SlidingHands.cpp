@@ -22,7 +22,8 @@ double drawNormal(RandomNumbers& random) {
  * The hands of a linker that slide do so as long as a step takes, in turn.
  *
  * In a step that relaxes the spring by less than all of it, they move together as far as the load at the start takes
- * them: chains follow in the rest of the step, so that it stays. In longer steps they relax as on chains that stand still.
+ * them: chains follow in the rest of the step, so that it stays. In longer steps they relax as on chains that stand
+ * still.
  */
 void LinkerKinetics::slide(Linker& linker, const KineticStep& step, RandomNumbers& random, Count& count) const {
     const LinkerType& type = system.types[linker.type];

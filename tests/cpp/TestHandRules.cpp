@@ -152,7 +152,7 @@ static void testTransActivation() {
     check(alone > 100, "second hands are never alone");
 }
 
-/** Two rods, one of which turns about its middle, by Monte Carlo moves: what there is has the weights of all states. */
+/** Two rods, one of which turns about its middle, by Monte Carlo moves: all states have their weights. */
 static void testTurning() {
     const int number = 6;
     LinkerSystem system = twoHands(0.003, 0, 300, 300, 0.3);

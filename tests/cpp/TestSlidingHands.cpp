@@ -1,6 +1,6 @@
 /**
- * This tests hands that slide along chains which stand still: where they are, against quadrature, for steps over a factor
- * of a hundred; how fast they are under a load, and how they diffuse; and ends.
+ * This tests hands that slide along chains which stand still: where they are, against quadrature, for steps over a
+ * factor of a hundred; how fast they are under a load, and how they diffuse; and ends.
  */
 
 #include "TestLinkerSystems.h"
@@ -192,7 +192,7 @@ static void testEnds() {
                 checkClose(0.25+near, first/1e4, 1, 4*sqrt(0.25/1e4), "places between ends");
             }
             else if (stepSize == 1)
-                // They are missed that go beyond an end and come back in a step: the rod is longer by a share of a move.
+                // Those that go beyond an end and come back in a step are missed.
                 checkClose(expected, bound/1e4, 1, 0.06, "not yet released");
         }
     }

@@ -171,13 +171,9 @@ public:
      * @param excluded  whether it binds to all but what is near; else to what is near alone
      */
     void setHandBindingRange(int hand, int end, double range, bool excluded);
-    /**
-     * Get to which part of filaments a kind of hands binds, see setHandBindingRange().
-     */
+    /** Get to which part of filaments a kind of hands binds, see setHandBindingRange(). */
     void getHandBindingRange(int hand, int& end, double& range, bool& excluded) const;
-    /**
-     * Get the friction of hands of a kind that slide, measured in kJ ps/mol/nm^2, or 0 if they do not.
-     */
+    /** Get the friction of hands of a kind that slide, measured in kJ ps/mol/nm^2, or 0 if they do not. */
     double getHandSliding(int hand) const;
     /**
      * Let hands of a kind slide along filaments: at random, and by the force of the spring, over their friction.
@@ -251,9 +247,7 @@ public:
      * @param concentration  their number per nm^3 if that does not change, or -1 if there are as many as were added
      */
     void setLinkerTypeReservoir(int type, double volume, double concentration);
-    /**
-     * Get which pairs of places linkers of a type join, and in which order their hands bind, see setLinkerTypeRules().
-     */
+    /** Get which pairs of places linkers of a type join, and in which order their hands bind. */
     void getLinkerTypeRules(int type, double& leastCosine, double& largestCosine, bool& transActivated,
             bool& reversible) const;
     /**
