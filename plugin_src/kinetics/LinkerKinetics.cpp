@@ -155,7 +155,8 @@ bool LinkerKinetics::draw(LinkerState& state, const KineticStep& step, Pending& 
     };
     const bool pulls = linker.pulls();
     const Spring spring = pulls ? measure(linker, step) : Spring();
-    const bool staysByAngle = pulls && type.reversible && !isAligned(linker.hands[0], linker.hands[1], type, step);
+    const bool staysByAngle = pulls && type.reversible && type.hasAngles() &&
+            !isAligned(linker.hands[0], linker.hands[1], type, step);
     for (int side = 0; side < 2; side++) {
         const int number = type.hands[side];
         if (number < 0)

@@ -301,7 +301,7 @@ bool LinkerKinetics::proposePlace(const Linker& linker, int side, const KineticS
     const double distance = sqrt(dot(vector, vector));
     return distance <= hand.reach &&
             accepted < exp(-(1-hand.strainShare)*reduced(energyOf(type, distance))) &&
-            isAligned(linker.hands[1-side], found, type, step);
+            (!type.hasAngles() || isAligned(linker.hands[1-side], found, type, step));
 }
 
 /** Find a place anywhere on its chains for a hand of an unbound linker; false if that is taken. */

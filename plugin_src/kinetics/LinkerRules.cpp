@@ -9,7 +9,7 @@ using namespace std;
 /** Whether the angle between the chains at two places is one at which a linker joins them. */
 bool LinkerKinetics::isAligned(const HandPlace& first, const HandPlace& second, const LinkerType& type,
         const KineticStep& step) const {
-    if (!type.hasAngles() || !first.isBound() || !second.isBound())
+    if (!first.isBound() || !second.isBound())
         return true;
     double u[3], v[3];
     contours.findTangent(first.chain, first.position, step.positions, step.boxes.segments, u);

@@ -169,7 +169,7 @@ static void testTurning() {
         }
     };
     auto everywhere = [] (int, double, int, double) {return true;};
-    // By quadrature: the mean squared cosine, and how many linkers join both rods, at angles within the rule and beyond.
+    // By quadrature: the mean squared cosine, and how many linkers join both rods, within the rule and beyond.
     double norm = 0, cosine = 0, within = 0, beyond = 0;
     const int points = 60;
     for (int i = 0; i < points; i++) {
