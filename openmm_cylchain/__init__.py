@@ -48,6 +48,7 @@ from .filaments.presets import ACTIN_AGING, ACTIN_ATP, DSDNA, F_ACTIN, MDIA1_END
 from .filaments.segment_place import SegmentPlace
 from .filaments.severing import Severing
 from .filaments.shapes import FilamentOptions
+from .kinetics.binding_range import BindingRange
 from .kinetics.branching import Branching
 from .kinetics.crosslinker import Crosslinker
 from .kinetics.growth_force import FilamentGrowth
@@ -85,6 +86,7 @@ __all__ = [
     "ALPHA_ACTININ",
     "Attachment",
     "BeadSpringType",
+    "BindingRange",
     "Box",
     "BoxWarning",
     "ConstantVelocityPulling",

@@ -8,8 +8,8 @@ from .settings import OFF
 
 _PLAIN, _MOTORS, _ON_SITES = ("bind", "none", ""), ("move", "motor"), ("walk", "digit")
 _NEAR_ENDS = "hands near ends"
-_OF_ACTIVITY = {"slide": "hands that slip along filaments"}
 _ENDS = {"plus_end": "plus", "minus_end": "minus"}
+_RANGES = {**_ENDS, "both_ends": "both"}
 _AT_END = "8 nm"
 """How near to an end a motor counts as there."""
 _LEAST_REACH = 0.001
@@ -54,24 +54,26 @@ def read_hand(translation, name, line):
     force = settings.number("unbinding_force", ("unbinding", 1), default=math.inf)
     if 0.0 < force < math.inf:
         hand.set("unbinding_force", force, "pN")
-    _read_activity(hand, settings)
+    _read_activity(translation, hand, settings)
     _read_ends(translation, hand, settings)
     _read_keys(translation, hand, settings)
     return hand
 
 
-def _read_activity(hand, settings):
+def _read_activity(translation, hand, settings):
     activity = settings.text("activity", default="bind")
     if activity in (*_PLAIN, "track"):
         return
     if activity == "cut":
         _read_cutting(hand, settings)
         return
+    if activity == "slide":
+        _read_sliding(translation, hand, settings)
+        return
     if activity not in (*_MOTORS, *_ON_SITES):
-        needs = _OF_ACTIVITY.get(activity, f"hands: {activity}")
         # What else it has is of that activity.
         settings.take_rest()
-        hand.note(LEFT_OUT, f"activity = {activity}", settings.line_of("activity"), needs)
+        hand.note(LEFT_OUT, f"activity = {activity}", settings.line_of("activity"), f"hands: {activity}")
         return
     speed = settings.number("unloaded_speed", "speed", "max_speed", default=0.0)
     stall = settings.number("stall_force", "force", default=math.inf)
@@ -90,6 +92,24 @@ def _read_activity(hand, settings):
         hand.note(NEAREST, "it walks backward at most as fast as forward", settings.line_of("limit_speed"))
 
 
+def _read_sliding(translation, hand, settings):
+    mobility, line = settings.number("mobility", default=0.0), settings.line_of("mobility")
+    diffusion, energy = settings.number("diffusion", default=0.0), translation.thermal_energy
+    # Of their implicit steps.
+    settings.values("stiffness")
+    if mobility <= 0.0:
+        hand.note(EXACT if diffusion == 0.0 else LEFT_OUT, "it has no mobility", line, "hands that diffuse alone")
+        return
+    hand.set("sliding_friction", 1.0 / mobility, "pN*s/um")
+    hand.note(EXACT, f"mobility = {mobility:g}", line)
+    if diffusion > 0.0 and not math.isclose(diffusion, mobility * energy, rel_tol=0.02):
+        hand.note(NEAREST, f"a diffusion of kT mobility, for {diffusion:g}", settings.line_of("diffusion"))
+    holds = [settings.number(("hold_growing_end", end), default=0.0) for end in (0, 1)]
+    hand.table["at_end"] = "hold" if any(holds) else "release"
+    if any(holds) and holds != [1.0, 1.0]:
+        hand.note(NEAREST, "it stays at both ends", settings.line_of("hold_growing_end"))
+
+
 def _read_cutting(hand, settings):
     rate = settings.number("cutting_rate", default=0.0)
     settings.values("new_end_state")
@@ -101,10 +121,10 @@ def _read_cutting(hand, settings):
 def _read_ends(translation, hand, settings):
     tracks = settings.text("activity") == "track"
     end = settings.text("bind_only_end", "bind_end", default="off")
-    tracked = settings.text("track_end", default=end) if tracks else "off"
+    tracked = settings.text("track_end", default="off") if tracks else "off"
     if settings.text("bind_also_end", "bind_also_ends") not in OFF:
         hand.note(EXACT, "it binds at ends as well, as all of ours do", settings.line_of("bind_also_end"))
-    if end not in OFF or tracks:
+    if end not in OFF or tracked not in OFF:
         _bind_near(translation, hand, settings, end, tracked)
     forward = not hand.table.get("speed", "0").startswith("-")
     holds = settings.number(("hold_growing_end", 0 if forward else 1), "hold_growing_ends", default=0.0)
@@ -118,18 +138,22 @@ def _read_ends(translation, hand, settings):
 def _bind_near(translation, hand, settings, end, tracked):
     reach = settings.number("bind_end_range", ("bind_only_end", 1), ("bind_end", 1), default=0.0)
     line = settings.line_of("bind_only_end")
-    known = end in _ENDS and tracked in ("off", end) and _grows(translation, settings)
-    if not known or settings.flag("bind_only_free_end", default=False):
+    alone = settings.flag("bind_only_free_end", default=False)
+    if end in _RANGES and tracked in OFF and not alone and "sliding_friction" not in hand.table:
+        near = {"end": _RANGES[end], "range": quantity(max(reach, _LEAST_REACH), "um")}
+        hand.table["binding_range"] = near
+        hand.note(EXACT if reach >= _LEAST_REACH else NEAREST, "bind_only_end", line)
+        return
+    if alone or end not in _ENDS or tracked != end or not _grows(translation, settings):
         hand.note(LEFT_OUT, f"bind_only_end = {end}", line, _NEAR_ENDS)
         return
     hand.table["filament_end"] = {
         "end": _ENDS[end],
         "range": quantity(max(reach, _LEAST_REACH), "um"),
         "binds_there": True,
-        "tracks": tracked != "off",
+        "tracks": True,
     }
-    kind = EXACT if tracked != "off" else NEAREST
-    hand.note(kind, "bind_only_end; it is at the end itself as soon as it binds, where that is within its reach", line)
+    hand.note(EXACT, "bind_only_end; it is at the end itself as soon as it binds, where that is within its reach", line)
 
 
 def _grows(translation, settings):
@@ -158,7 +182,10 @@ def _hold_shrinking(translation, hand, settings, forward):
     if not any(chances) or not _grows(translation, settings) or "filament_end" in hand.table:
         return
     line, walked_to = settings.line_of("hold_shrinking_end"), 0 if forward else 1
-    if chances[walked_to] == 1.0 and chances[1 - walked_to] == 0.0 and hand.table.get("at_end") == "hold":
+    if not {"speed", "sliding_friction"} & set(hand.table) and set(chances) <= {0.0, 1.0}:
+        hand.table["at_end"] = "hold"
+        hand.note(NEAREST, "hold_shrinking_end: it stays at either end that shrinks to where it is", line)
+    elif chances[walked_to] == 1.0 and chances[1 - walked_to] == 0.0 and hand.table.get("at_end") == "hold":
         end = ("plus", "minus")[walked_to]
         hand.table["filament_end"] = {"end": end, "range": _AT_END, "tracks": True}
         hand.note(NEAREST, "hold_shrinking_end: it stays at the end that it has walked to", line)

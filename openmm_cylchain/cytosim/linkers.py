@@ -20,9 +20,15 @@ _RANGE_AND_LAW = (
     "k_on/(2 reach) exp(-U/kT) for each length within reach of a hand that is tied, which has an equilibrium; in "
     "Cytosim it is k_on wherever a fiber is within reach, however strained"
 )
+_COSINES = {
+    "parallel": [0.5, 1.0],
+    "not_parallel": [-1.0, 0.5],
+    "antiparallel": [-1.0, -0.5],
+    "not_antiparallel": [-0.5, 1.0],
+    "orthogonal": [-0.7071, 0.7071],
+}
 _COUPLES = {
     "fork": "links that hold an angle (fork)",
-    "slide": "hands that slip along filaments",
     "duo": "linkers that are active in places (duo)",
 }
 
@@ -276,6 +282,9 @@ def _couple_table(translation, own, linked):
     hands = _hands_of(translation, own)
     if not _binds(translation, own, hands):
         return
+    activity = settings.text("activity", default="diffuse")
+    if activity in ("slide", "shackle"):
+        _let_slide(translation, own, hands[0])
     table = translation.document.table("[[linkers]]", own.line)
     table.add("name", own.name, Note(EXACT, f"couple {own.name}", own.line))
     _add_spring(translation, table, own)
@@ -293,16 +302,40 @@ def _couple_table(translation, own, linked):
     if linked.bound:
         bound = min(linked.bound, linked.count)
         table.add("bound", bound, Note(NEAREST, "attach1: one hand is bound, at random"))
-    activity = settings.text("activity", default="diffuse")
+    _add_rules(table, settings)
     if activity in _COUPLES:
         settings.take_rest()
         table.comment(Note(LEFT_OUT, f"activity = {activity}", settings.line_of("activity"), _COUPLES[activity]))
-    for key in ("specificity", "trans_activated"):
-        if settings.text(key) not in OFF:
-            text = f"{key} = {settings.text(key)}"
-            table.comment(Note(LEFT_OUT, text, settings.line_of(key), _PAIRS))
     for note in dict.fromkeys(hands[0].notes + hands[1].notes):
         table.comment(note)
+
+
+def _let_slide(translation, own, hand):
+    # Its first hand is where the second one is nearest, so it takes no load along its fiber.
+    line, stiffness = own.settings.line_of("activity"), _stiffness(translation, own)
+    others = {"speed", "site_spacing", "binding_range"} & set(hand.table)
+    if others:
+        hand.note(LEFT_OUT, f"{own.name} slides", line, "hands that slide and walk")
+        return
+    hand.table["at_end"] = "hold"
+    hand.set("sliding_friction", stiffness * translation.script.time_step, "pN*s/um")
+    hand.note(
+        NEAREST, f"{own.name} slides: with so little friction that a step relaxes its spring; Cytosim's has none", line
+    )
+
+
+def _add_rules(table, settings):
+    rule, line = settings.text("specificity"), settings.line_of("specificity")
+    ruled = rule in _COSINES
+    if ruled:
+        table.add("cosine_range", _COSINES[rule], Note(EXACT, f"specificity = {rule}", line))
+    elif rule not in OFF:
+        table.comment(Note(LEFT_OUT, f"specificity = {rule}", line, _PAIRS))
+    if settings.text("trans_activated") not in OFF:
+        table.add("trans_activated", True, Note(EXACT, "trans_activated", settings.line_of("trans_activated")))
+        ruled = True
+    if ruled:
+        table.add("reversible", False, Note(EXACT, "hands unbind wherever they are, without detailed balance"))
 
 
 def _binds(translation, own, hands):
@@ -318,9 +351,10 @@ def _add_spring(translation, table, own):
     table.add("stiffness", quantity(_stiffness(translation, own), "pN/um"), Note(EXACT, ""))
     length = own.settings.number("length", default=0.0)
     if length > 0.0:
-        table.add(
-            "rest_length", quantity(length, "um"), Note(NEAREST, "a spring in any direction; Cytosim's is across")
-        )
+        note = Note(NEAREST, "a spring in any direction; Cytosim's is across")
+        if own.settings.text("activity") == "bridge":
+            note = Note(EXACT, "activity = bridge")
+        table.add("rest_length", quantity(length, "um"), note)
 
 
 def _add_count(translation, table, own, linked, hand):

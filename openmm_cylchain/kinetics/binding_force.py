@@ -14,6 +14,7 @@ from ..filaments.filament import Filament
 from ..mechanics.geometry import to_nearest_images
 from ..units.quantities import require_kind, thermal_energy
 from ..units.types import FloatArray, IntArray
+from .binding_range import ENDS_OF_RANGE
 from .first_places import FirstPlaces, contour_of
 from .growth_force import branchings_of
 from .hand import Hand
@@ -76,6 +77,7 @@ def make_binding_force(
         number = force.addLinkerType(
             first, numbers[1], own.kind.rest_length, own.kind.stiffness, own.kind.same_filament
         )
+        force.setLinkerTypeRules(number, *own.kind.cosine_range, own.kind.trans_activated, own.kind.reversible)
         density = -1.0 if own.concentration is None else own.concentration
         force.setLinkerTypeReservoir(number, own.volume or 0.0, density)
         if own.diffusion is not None:
@@ -155,9 +157,13 @@ def _add_hand(force, hand, filaments, name):
     force.setHandUnbinding(
         number, hand.strain_share, hand.unbinding_force or 0.0, hand.catch_rate, hand.catch_force or 0.0
     )
-    force.setHandWalking(number, hand.speed, hand.stall_force or 0.0, hand.walks_backward, hand.at_end == "hold")
+    force.setHandWalking(number, hand.speed, hand.stall_force or 0.0, hand.walks_backward, hand.holds_at_ends)
     force.setHandSiteSpacing(number, hand.site_spacing or 0.0)
     force.setHandSevering(number, hand.severing_rate)
+    force.setHandSliding(number, hand.sliding_friction or 0.0)
+    if hand.binding_range is not None:
+        own = hand.binding_range
+        force.setHandBindingRange(number, ENDS_OF_RANGE.index(own.end), own.range, own.excluded)
     if hand.severing_rate > 0.0 and not any(filaments[i].growth is not None for i in chains):
         raise InputError(f"Linkers {name!r}: a hand cuts filaments, but binds to none that grow: give them a growth.")
     if hand.filament_end is not None:

@@ -6,7 +6,18 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from ..units.quantities import LENGTH, STIFFNESS, non_negative, positive, require_kind, thermal_energy, true_or_false
+from ..units.quantities import (
+    DIMENSIONLESS,
+    LENGTH,
+    STIFFNESS,
+    finite_number,
+    non_negative,
+    positive,
+    require_kind,
+    shown,
+    thermal_energy,
+    true_or_false,
+)
 from ..units.types import Scalar
 from .hand import Hand
 
@@ -28,6 +39,15 @@ class Crosslinker:
         d0; may be zero.
     same_filament : bool
         Whether both hands may bind to one filament.
+    cosine_range : two floats
+        The second hand to bind does so where the cosine of the angle between both filaments is between these: (0.5, 1)
+        joins those that are parallel within 60 degrees, (-1, -0.5) those that are antiparallel.
+    trans_activated : bool
+        The second hand binds only while the first one is bound, and that one only before it.
+    reversible : bool
+        Whether hands unbind only where and when they could bind by ``cosine_range`` and ``trans_activated``: what is
+        bound stays where filaments turn out of the range, and the first hand stays as long as the second one is bound.
+        Without it they always unbind, which breaks detailed balance.
     name : str
         For tables and messages.
 
@@ -42,6 +62,9 @@ class Crosslinker:
     rest_length: float = 0.0
     same_filament: bool = False
     name: str = "crosslinker"
+    cosine_range: tuple[float, float] = (-1.0, 1.0)
+    trans_activated: bool = False
+    reversible: bool = True
 
     if TYPE_CHECKING:  # What may be given; the attributes hold plain numbers.
 
@@ -53,6 +76,9 @@ class Crosslinker:
             rest_length: Scalar = 0.0,
             same_filament: bool = False,
             name: str = "crosslinker",
+            cosine_range: Sequence[float] = (-1.0, 1.0),
+            trans_activated: bool = False,
+            reversible: bool = True,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -66,6 +92,15 @@ class Crosslinker:
         object.__setattr__(self, "hands", hands)
         object.__setattr__(self, "stiffness", positive(self.stiffness, STIFFNESS, f"{label} stiffness"))
         object.__setattr__(self, "rest_length", non_negative(self.rest_length, LENGTH, f"{label} rest_length"))
+
+        true_or_false(self.trans_activated, f"{label} trans_activated")
+        true_or_false(self.reversible, f"{label} reversible")
+        object.__setattr__(self, "cosine_range", _as_cosines(self.cosine_range, f"{label} cosine_range"))
+
+    @property
+    def has_rules(self) -> bool:
+        """Whether which hand binds, or where, depends on the other one."""
+        return self.trans_activated or self.cosine_range != (-1.0, 1.0)
 
     @property
     def is_motor(self) -> bool:
@@ -83,3 +118,11 @@ class Crosslinker:
         kT = thermal_energy(temperature)
         energy = 0.5 * self.stiffness * extension * abs(extension)
         return energy / kT if kT > 0.0 else math.copysign(math.inf, energy)
+
+
+def _as_cosines(given, label):
+    values = tuple(given) if isinstance(given, Sequence) and not isinstance(given, str) else ()
+    cosines = tuple(finite_number(value, DIMENSIONLESS, label) for value in values)
+    if len(cosines) != 2 or not -1.0 <= cosines[0] <= cosines[1] <= 1.0:
+        raise InputError(f"{label} must be two numbers that ascend, between -1 and 1, but is {shown(given)}.")
+    return cosines

@@ -18,6 +18,9 @@ _MOST_SITES = 1e9
 _CANDIDATES = 200
 """Places of which that of an anchored linker is drawn."""
 
+_MOST_ROUNDS = 1000
+"""In which places are drawn that are in range."""
+
 _PIECES = 16
 """Straight ones, in place of the curve of a beam element where what is within reach is looked for."""
 
@@ -45,6 +48,7 @@ class FirstPlaces:
         self._filaments, self._kT, self._box = filaments, kT, box
         self._contours = [contour_of(filament) for filament in filaments]
         self._lengths = np.array([contour[-1] for contour in self._contours])
+        self._closed = np.array([filament.closed for filament in filaments])
         # By the distance of sites, filaments and numbers of those that are taken.
         self._taken: dict[float, IntArray] = {}
 
@@ -54,6 +58,8 @@ class FirstPlaces:
             return np.zeros(0, dtype=int), np.zeros(0)
         lengths = np.where(self._binds(hand), self._lengths, 0.0)
         _refuse_without_length(lengths, count, name)
+        if hand.binding_range is not None:
+            return self._in_range(hand, count, lengths, generator, name)
         if hand.site_spacing is None:
             chains = generator.choice(len(lengths), count, p=lengths / lengths.sum())
             return chains, generator.uniform(0.0, lengths[chains])
@@ -70,6 +76,23 @@ class FirstPlaces:
         chosen += np.searchsorted(occupied - np.arange(len(occupied)), chosen, side="right")
         chains = np.searchsorted(ends, chosen, side="right")
         return self._take(hand.site_spacing, chains, chosen - (ends - sites)[chains])
+
+    def _in_range(self, hand, count, lengths, generator, name):
+        # Places anywhere, of which those are kept that are in range.
+        if hand.site_spacing is not None:
+            raise InputError(f"Linkers {name!r}: let them begin unbound: their hands have sites and a binding_range.")
+        found: list[Places] = []
+        for _ in range(_MOST_ROUNDS):
+            chains = generator.choice(len(lengths), _CANDIDATES + count, p=lengths / lengths.sum())
+            along = generator.uniform(0.0, lengths[chains])
+            kept = hand.binding_range.includes(along, lengths[chains], self._closed[chains])
+            found.append((chains[kept], along[kept]))
+            if sum(len(own) for own, _ in found) >= count:
+                break
+        chains, along = (np.concatenate(column)[:count] for column in zip(*found))
+        if len(chains) < count:
+            raise InputError(f"Linkers {name!r}: {count} are to begin bound, but few or no places are in their range.")
+        return chains, along
 
     def near(
         self, points: FloatArray, kind: Crosslinker, count: int, generator: np.random.Generator
@@ -128,6 +151,9 @@ class FirstPlaces:
             taken = set(map(tuple, self._taken_sites(spacing).tolist()))
             allowed = numbers < self._sites(spacing, self._lengths)[chains]
             allowed &= [own not in taken for own in zip(chains.tolist(), numbers.tolist())]
+        own = kind.hands[1].binding_range
+        if own is not None:
+            allowed &= own.includes(along, self._lengths[chains], self._closed[chains])
         distances = np.linalg.norm(self._nearest(self._positions(chains, along) - point), axis=1)
         allowed &= distances <= kind.hands[1].reach
         if not np.any(allowed):

@@ -9,6 +9,7 @@ from ..filaments.chain_type import ChainType
 from ..units.quantities import (
     DIMENSIONLESS,
     FORCE,
+    FRICTION,
     LENGTH,
     RATE,
     VELOCITY,
@@ -21,12 +22,13 @@ from ..units.quantities import (
     true_or_false,
 )
 from ..units.types import Scalar
+from .binding_range import BindingRange
 from .hand_at_end import HandAtEnd
 
 AT_ENDS = ("release", "hold")
-"""What a hand may do at the end of a filament to which it has walked."""
+"""What a hand may do at the end of a filament to which it has walked or slid."""
 
-_OPTIONAL = ("unbinding_force", "catch_force", "stall_force", "site_spacing")
+_OPTIONAL = ("unbinding_force", "catch_force", "stall_force", "site_spacing", "sliding_friction")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +47,9 @@ class Hand:
       with ``unbinding_rate exp(|F|/F_u)`` (Bell, Science 1978, 200, 618). A ``catch_rate`` adds a second pathway, which
       load closes: ``catch_rate exp(-|F|/catch_force)`` (Pereverzev et al., Biophys. J. 2005, 89, 1446);
     - walks with the speed ``speed (1 + F_w/stall_force)`` under the force F_w of the spring along the direction of
-      walking, at most twice its ``speed``, and not backward unless ``walks_backward`` (then at most as fast).
+      walking, at most twice its ``speed``, and not backward unless ``walks_backward`` (then at most as fast);
+    - slides, if it has a ``sliding_friction`` f, with the speed F_t/f under the force F_t of the spring along the
+      filament, and at random, with the diffusion coefficient k_B T/f.
 
     Without ``unbinding_force``, ``catch_rate`` and ``speed``, rates obey detailed balance: the equilibrium of bound and
     unbound linkers is that of their energies.
@@ -67,8 +71,9 @@ class Hand:
     stall_force : force, optional
         If not given, no load changes the speed.
     walks_backward : bool
-    at_end : {"release", "hold"}
-        What it does at the end of a filament to which it has walked.
+    at_end : {"release", "hold"}, optional
+        What it does at the end of a filament to which it has walked or slid. If not given, a hand that slides stays
+        there, as detailed balance needs it, and others let go.
     site_spacing : length, optional
         It binds to sites so far apart along filaments, which hold one hand each, and steps from one to the next. Hands
         of all kinds with the same spacing share their sites.
@@ -76,6 +81,10 @@ class Hand:
         Types of filaments, or their names; all if not given.
     filament_end : HandAtEnd, optional
         What it has to do with an end of filaments that grow.
+    binding_range : BindingRange, optional
+        Near which end of filaments it binds, or does not; everywhere if not given.
+    sliding_friction : friction, optional
+        It slides along filaments, with this friction. Such a hand has no ``speed``, no sites and no ``binding_range``.
     severing_rate : 1/time
         At which it cuts the filament to which it is bound, which must grow, before the nearest monomer: katanin,
         gelsolin, a clump of cofilin. New ends are as ``Growth.severing`` says; the hand stays where it was.
@@ -96,11 +105,13 @@ class Hand:
     speed: float = 0.0
     stall_force: float | None = None
     walks_backward: bool = False
-    at_end: str = "release"
+    at_end: str | None = None
     site_spacing: float | None = None
     binds_to: tuple[str, ...] | None = None
     filament_end: HandAtEnd | None = None
     severing_rate: float = 0.0
+    binding_range: BindingRange | None = None
+    sliding_friction: float | None = None
 
     if TYPE_CHECKING:  # What may be given; the attributes hold plain numbers.
 
@@ -117,11 +128,13 @@ class Hand:
             speed: Scalar = 0.0,
             stall_force: Scalar | None = None,
             walks_backward: bool = False,
-            at_end: str = "release",
+            at_end: str | None = None,
             site_spacing: Scalar | None = None,
             binds_to: Sequence[ChainType | str] | None = None,
             filament_end: HandAtEnd | None = None,
             severing_rate: Scalar = 0.0,
+            binding_range: BindingRange | None = None,
+            sliding_friction: Scalar | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -140,6 +153,7 @@ class Hand:
         convert("stall_force", positive, FORCE)
         convert("site_spacing", positive, LENGTH)
         convert("severing_rate", non_negative, RATE)
+        convert("sliding_friction", positive, FRICTION)
         true_or_false(self.walks_backward, "Hand: walks_backward")
         if self.strain_share > 1.0:
             raise InputError(f"Hand: strain_share must be between 0 and 1, but is {self.strain_share:g}.")
@@ -149,7 +163,16 @@ class Hand:
             raise InputError("Hand: catch_rate and catch_force must be given together.")
         if self.speed == 0.0 and (self.stall_force is not None or self.walks_backward):
             raise InputError("Hand: stall_force and walks_backward say how it walks, but its speed is zero.")
-        one_of(self.at_end, AT_ENDS, "Hand: at_end")
+        if self.sliding_friction is not None:
+            for name in ("speed", "site_spacing", "binding_range"):
+                if getattr(self, name):
+                    raise InputError(f"Hand: give sliding_friction or {name}, not both.")
+        if self.at_end is not None:
+            one_of(self.at_end, AT_ENDS, "Hand: at_end")
+        if self.binding_range is not None:
+            require_kind(self.binding_range, BindingRange, "Hand: binding_range")
+            if self.filament_end is not None and self.filament_end.binds_there:
+                raise InputError("Hand: one that binds at ends has no binding_range: leave one of them out.")
         if self.filament_end is not None:
             require_kind(self.filament_end, HandAtEnd, "Hand: filament_end")
             if self.filament_end.binds_there and self.site_spacing is not None:
@@ -168,6 +191,11 @@ class Hand:
     def rate_per_length(self) -> float:
         """The rate of binding per length of filament where the spring is not strained, in 1/(ps nm)."""
         return self.binding_rate / (2.0 * self.reach)
+
+    @property
+    def holds_at_ends(self) -> bool:
+        """Whether it stays at the end of a filament to which it has come."""
+        return self.at_end == "hold" or (self.at_end is None and self.sliding_friction is not None)
 
     def binds(self, filament_type: ChainType) -> bool:
         """Whether it binds to filaments of a type."""

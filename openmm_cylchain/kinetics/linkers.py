@@ -145,6 +145,10 @@ def as_linkers(
     if anchors is not None:
         if kind.hands[0] != kind.hands[1]:
             raise InputError(f"{label} a linker with an anchor has one hand, but this type has two that differ.")
+        if kind.has_rules:
+            raise InputError(
+                f"{label} a linker with an anchor has one hand: cosine_range and trans_activated are of two."
+            )
         places = _as_anchors(anchors, label)
         return Linkers(kind, len(places), None, None, places, _as_bound(bound, len(places), label), seed)
     if concentration is not None:

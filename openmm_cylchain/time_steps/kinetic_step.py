@@ -10,6 +10,9 @@ bind, walk and unbind, and linkers while filaments move:
   take a fifth at most. Hands walk after all have bound and unbound, with the speed under the load at the start: a
   filament that follows then has the speed of theory up to k_s v dt/F_s = 1 (measured: within 0.2 % for gliding, also
   at ``k dt`` = 0.8 and where hands walk by more than their reach, and within 1.5 % near stall);
+- a hand that slides relaxes its spring with the rate k_s/f, of which a step should take a tenth at most: it moves as
+  far as the load at the start takes it, which is right where the filament follows at once, and relaxes a spring faster
+  by k_s dt/(2 f) between what stands still;
 - hands that bind to sites step between binding and unbinding, along filaments that stand still, which makes them
   slower by (k + k_s v/F_s) dt/2: both are a tenth at most (measured: 8 % slower at a fifth);
 - implicit steps lose the direction of a spring that has a rest length when its ends diffuse by that, as those of
@@ -32,6 +35,9 @@ SHARE_OF_RATE = 0.2
 
 SHARE_OF_RATE_ON_SITES = 0.1
 """The same of hands that bind to sites and walk."""
+
+SHARE_OF_RELAXATION = 0.1
+"""By how much a hand that slides relaxes its spring in a step."""
 
 SHARE_OF_REACH = 0.2
 """How far a hand may walk in a step, over its reach."""
@@ -120,6 +126,9 @@ def _steps_of_hand(force, hand, stiffness):
         )
     if max(rates) > 0.0:
         yield f"a hand unbinds with the rate {max(rates) * 1e12:.3g}/s", share / max(rates)
+    friction = force.getHandSliding(hand)
+    if friction > 0.0 and stiffness > 0.0:
+        yield "a hand that slides relaxes its spring", SHARE_OF_RELAXATION * friction / stiffness
     if speed != 0.0:
         yield f"a hand walks by {SHARE_OF_REACH:g} of its reach", SHARE_OF_REACH * reach / abs(speed)
         if stall > 0.0 and stiffness > 0.0:

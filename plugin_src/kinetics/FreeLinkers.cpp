@@ -11,7 +11,7 @@ using namespace std;
 namespace {
 
 /** Levels of noise: the events of linkers are at level 0. */
-const uint32_t LEVEL_OF_DIFFUSION = 30, LEVEL_OF_RELEASE = 29, LEVEL_OF_ENDS = 28;
+const uint32_t LEVEL_OF_DIFFUSION = 30, LEVEL_OF_RELEASE = 29, LEVEL_OF_ENDS = 28, LEVEL_OF_SLIDING = 27;
 /** Near a wall, of where a linker is put whose hand had to let go. */
 const int MOST_TRIES = 100;
 /** Of a word of 32 bits. */
@@ -24,6 +24,8 @@ const double WORD = 0x1p-32;
  * each concentration is the same for both hands, and that of linkers without positions.
  */
 double LinkerKinetics::freeRate(const LinkerType& type, int side) const {
+    if (!type.mayBind(side, false))
+        return 0;
     const Hand& own = system.hands[type.hands[side]];
     const double ratio = system.hands[type.hands[1-side]].reach/own.reach;
     return own.bindingRate*(type.planar ? ratio : ratio*sqrt(ratio));
@@ -126,7 +128,13 @@ void LinkerKinetics::walkOne(LinkerState& state, size_t index, const KineticStep
     Linker& linker = state.linkers[index];
     const int side = linker.hands[0].isBound() ? 0 : 1;
     const HandPlace before = linker.hands[side];
-    walkAll(linker, step, watches[index], count);
+    if (kinds[watches[index].kind].slides) {
+        RandomNumbers random({step.seed, LEVEL_OF_SLIDING, state.steps}, step.force, linker.number);
+        slide(linker, step, random, count);
+        watches[index] = watch(linker);
+    }
+    if (kinds[watches[index].kind].walks)
+        walkAll(linker, step, watches[index], count);
     if (system.isFree(linker)) {
         RandomNumbers random({step.seed, LEVEL_OF_RELEASE, state.steps}, step.force, linker.number);
         release(state, index, side, before, contours, step, random);

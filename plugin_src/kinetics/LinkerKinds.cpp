@@ -37,13 +37,16 @@ void LinkerKinetics::findKinds(const KineticStep& step) {
             const Hand& hand = system.hands[type.hands[side]];
             const bool hops = hand.siteSpacing > 0 && hand.speed != 0;
             if ((held&(1<<side)) != 0) {
-                kind.rate += unbindingRate(hand, 0, 0)+(hops ? fabs(hand.speed)/hand.siteSpacing : 0);
-                kind.walks = kind.walks || (hand.speed != 0 && !hops);
+                if (held != 3 || !type.mustStay(side))
+                    kind.rate += unbindingRate(hand, 0, 0);
+                kind.rate += hops ? fabs(hand.speed)/hand.siteSpacing : 0;
+                kind.slides = kind.slides || hand.slidingFriction > 0;
+                kind.walks = kind.walks || kind.slides || (hand.speed != 0 && !hops);
                 kind.velocity = hops ? 0 : hand.speed;
-                known = known && (held != 3 || !(hand.isLoaded() || hops));
+                known = known && (held != 3 || !(hand.isLoaded() || hops || (type.hasAngles() && type.reversible)));
             }
             else if (held != 0)
-                kind.perPiece = proposalRate(hand);
+                kind.perPiece = type.mayBind(side, true) ? proposalRate(hand) : 0;
             else if (kind.isFree)
                 kind.perPiece += freeRate(type, side)*cells.getLongest();
             else if (type.concentration < 0)

@@ -155,13 +155,16 @@ bool LinkerKinetics::draw(LinkerState& state, const KineticStep& step, Pending& 
     };
     const bool pulls = linker.pulls();
     const Spring spring = pulls ? measure(linker, step) : Spring();
+    const bool staysByAngle = pulls && type.reversible && type.hasAngles() &&
+            !isAligned(linker.hands[0], linker.hands[1], type, step);
     for (int side = 0; side < 2; side++) {
         const int number = type.hands[side];
         if (number < 0)
             continue;
         const Hand& hand = system.hands[number];
         if (linker.hands[side].isBound()) {
-            add(Event::Unbind, side, 0, unbindingRate(hand, spring.energy, fabs(spring.force)));
+            if (!pulls || (!type.mustStay(side) && !staysByAngle))
+                add(Event::Unbind, side, 0, unbindingRate(hand, spring.energy, fabs(spring.force)));
             if (hand.siteSpacing > 0 && hand.speed != 0) {
                 const int direction = hand.speed > 0 ? 1 : -1;
                 double stiffness;
@@ -171,7 +174,7 @@ bool LinkerKinetics::draw(LinkerState& state, const KineticStep& step, Pending& 
             }
         }
         else if (linker.isHeld(1-side)) {
-            if (hand.bindingRate > 0)
+            if (hand.bindingRate > 0 && type.mayBind(side, true))
                 add(Event::Propose, side, 0, proposalRate(hand)*countAround(watches[next.index], step));
         }
         else if (type.diffuses()) {

@@ -52,6 +52,15 @@ struct KineticStep {
  * equilibrium are those without positions. In the plane, v is the area pi R_1 R_2, and the rate c R'/R. Neither moves
  * nor unbinding leave the region; what would do so does not happen, and the same is missing on the way back.
  *
+ * There may be rules for which hands bind. They multiply rates of binding by zero or one, by where chains are in the
+ * step, and, where they are reversible, rates of unbinding by the same number. So one way stays as likely as the other:
+ * equilibrium has all of the states that there are without a rule on angles, between which chains turn.
+ *
+ * Hands slide as a part of a step of their own, after events: with the spring's energy U(s) at the length s along the
+ * chain, and the friction f, by ds = -U' dt/f+(2 k_B T/f)^(1/2) dW. A move is proposed that is exact for the harmonic
+ * energy with the slope at s and the stiffness of the spring, and accepted by Metropolis and Hastings: equilibrium is
+ * exact at any step.
+ *
  * Each linker has a clock: the integral of its rates over time until its next event. Steps take it down, and only where
  * it runs out is anything drawn. Most rates follow from the type of a linker, from what it holds, and from how many
  * pieces of chains are around the piece that it holds: a step looks at two numbers of a linker, and nothing else.
@@ -102,6 +111,10 @@ private:
     struct Spring {
         double vector[3] = {0, 0, 0}, distance = 0, energy = 0, force = 0;
     };
+    /** The energy of a linker, and the mean and the variance of the move that is proposed to a hand which slides. */
+    struct Slope {
+        double energy, mean, variance;
+    };
     /** Where hands are that bind to sites: numbers of chain, spacing and site. */
     typedef std::unordered_set<std::uint64_t> Sites;
     struct Event;
@@ -128,7 +141,9 @@ private:
         /** If not zero, they are taken to have so many pieces around them, wherever they are. */
         unsigned most = 0;
         bool isFree = false, isPlanar = false;
-        bool atAnchor = false, sameChain = false, walks = false, needsSites = false, pulls = false;
+        /** Whether hands move that are bound to no sites, and whether any of them slides. */
+        bool walks = false, slides = false;
+        bool atAnchor = false, sameChain = false, needsSites = false, pulls = false;
         /** Whether a step has nothing to do for it as long as its clock does not run out. */
         bool rests = false;
     };
@@ -142,6 +157,9 @@ private:
     bool usesSites(const LinkerType& type) const;
     Place placeOf(const Linker& linker, int side) const;
     Spring measure(const Linker& linker, const KineticStep& step) const;
+    bool isAligned(const HandPlace& first, const HandPlace& second, const LinkerType& type,
+            const KineticStep& step) const;
+    bool isInRange(const Hand& hand, const HandPlace& place) const;
     double energyOf(const LinkerType& type, double distance) const;
     double reduced(double energy) const;
     double proposalRate(const Hand& hand) const;
@@ -149,6 +167,12 @@ private:
     double captureRate(const LinkerType& type, int side, const KineticStep& step) const;
     double pull(const Linker& linker, int side, const Spring& spring, const KineticStep& step, double& stiffness) const;
     double speedUnder(const Hand& hand, double pull) const;
+    void slide(Linker& linker, const KineticStep& step, RandomNumbers& random, Count& count) const;
+    void slideHand(Linker& linker, int side, const KineticStep& step, double duration, bool isShort,
+            RandomNumbers& random, Count& count) const;
+    void slideFreely(HandPlace& place, double move, bool isHeld) const;
+    Slope slopeAt(const Linker& linker, int side, const KineticStep& step, double duration,
+            bool isShort) const;
     void walk(Linker& linker, const KineticStep& step, Count& count) const;
     void walkPart(Linker& linker, const KineticStep& step, double duration, Count& count) const;
     bool draw(LinkerState& state, const KineticStep& step, Pending& next) const;

@@ -69,6 +69,8 @@ double LinkerKinetics::unbindingRate(const Hand& hand, double energy, double for
 
 /** The rate at which a hand of an unbound linker binds anywhere. */
 double LinkerKinetics::captureRate(const LinkerType& type, int side, const KineticStep& step) const {
+    if (!type.mayBind(side, false))
+        return 0;
     const Hand& hand = system.hands[type.hands[side]];
     const double length = sums[type.hands[side]].empty() ? 0 : sums[type.hands[side]].back();
     const double volume = type.volume > 0 ? type.volume : step.volume;
@@ -263,6 +265,8 @@ bool LinkerKinetics::toProposed(int number, const SegmentPiece& piece, double wh
         return false;
     if (hand.siteSpacing > 0 && (!toSite(hand, found) || sites->count(siteOf(hand, found)) > 0))
         return false;
+    if (hand.bindingRange.end >= 0 && !isInRange(hand, found))
+        return false;
     return !hand.atEnd.bindsThere || toEnd(hand, found);
 }
 
@@ -296,7 +300,8 @@ bool LinkerKinetics::proposePlace(const Linker& linker, int side, const KineticS
     vectorTo(found, from, step, vector);
     const double distance = sqrt(dot(vector, vector));
     return distance <= hand.reach &&
-            accepted < exp(-(1-hand.strainShare)*reduced(energyOf(type, distance)));
+            accepted < exp(-(1-hand.strainShare)*reduced(energyOf(type, distance))) &&
+            (!type.hasAngles() || isAligned(linker.hands[1-side], found, type, step));
 }
 
 /** Find a place anywhere on its chains for a hand of an unbound linker; false if that is taken. */
@@ -311,6 +316,8 @@ bool LinkerKinetics::captureAnywhere(const Linker& linker, int side, RandomNumbe
     found.position = contours.getBegin(found.chain)+min(contours.getLength(found.chain),
             along-(index == 0 ? 0 : sum[index-1]));
     if (hand.siteSpacing > 0 && (!toSite(hand, found) || sites->count(siteOf(hand, found)) > 0))
+        return false;
+    if (hand.bindingRange.end >= 0 && !isInRange(hand, found))
         return false;
     return !hand.atEnd.bindsThere || toEnd(hand, found);
 }

@@ -24,6 +24,16 @@ struct HandAtEnd {
     std::vector<int> changes = {};
 };
 
+/** The part of a chain to which a hand binds: what is near to an end, or all else. */
+struct BindingRange {
+    /** The plus end (1), the minus end (0), or either (2); -1 if it binds to all of the chain. */
+    int end = -1;
+    /** How near to it is near. */
+    double range = 0;
+    /** Whether it binds to all else. */
+    bool excluded = false;
+};
+
 /** An end at which a hand is that changes its state. */
 struct HeldEnd {
     int chain, end, freeState, heldState;
@@ -59,8 +69,11 @@ struct Hand {
     bool holdsAtEnds = false;
     /** If positive, it binds to sites this far apart along filaments, which hold one hand each. */
     double siteSpacing = 0;
+    /** If positive, a hand slides at random, and under the force of the spring, with this friction. */
+    double slidingFriction = 0;
     /** The rate at which it cuts chains that grow where it is bound. */
     double severingRate = 0;
+    BindingRange bindingRange;
     HandAtEnd atEnd;
     /** Whether the rate of unbinding depends on what the spring does. */
     bool isLoaded() const {
@@ -77,6 +90,23 @@ struct LinkerType {
     double stiffness = 0, restLength = 0;
     /** Whether both hands may bind to the same chain. */
     bool sameChain = false;
+    /** The second hand to bind does so where the cosine of the angle between both chains is between these. */
+    double leastCosine = -1, largestCosine = 1;
+    /** Whether the second hand binds only while the first one is bound, which binds only before it. */
+    bool transActivated = false;
+    /** Whether hands unbind only where and when they could bind by these rules. */
+    bool reversible = true;
+    bool hasAngles() const {
+        return leastCosine > -1 || largestCosine < 1;
+    }
+    /** Whether a hand may bind while the other one is held, or is not. */
+    bool mayBind(int side, bool isOtherHeld) const {
+        return !transActivated || (side == 1) == isOtherHeld;
+    }
+    /** Whether a hand stays as long as the other one is held. */
+    bool mustStay(int side) const {
+        return transActivated && reversible && side == 0;
+    }
     /**
      * Linkers that are not bound are anywhere in this volume; that of the periodic box if it is zero. Where their
      * concentration is kept, the volume has no effect.

@@ -238,9 +238,10 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         double& strainShare, double& unbindingForce, double& catchRate, double& catchForce, double& speed,
         double& stallForce, double& volume, double& concentration, double& elementLength, double& stretchingModulus,
         double& bendingRigidity, double& shortening, double& rate, double& angle,
-        double& distance, double& beyond, double& range, double& friction};
+        double& distance, double& beyond, double& range, double& friction, double& diffusion, double& leastCosine,
+        double& largestCosine};
 %apply bool& OUTPUT {bool& walksBackward, bool& holdsAtEnds, bool& sameChain, bool& vanishes, bool& isRegular,
-        bool& bindsThere, bool& tracks, bool& planar};
+        bool& bindsThere, bool& tracks, bool& planar, bool& excluded, bool& transActivated, bool& reversible};
 %apply long long& OUTPUT {long long& bindings, long long& unbindings};
 
 %pythoncode %{

@@ -90,14 +90,19 @@ def test_hands_that_cut(tmp_path):
 
 
 def test_hands_at_ends(tmp_path):
-    track = "activity = track; bind_only_end = plus_end, 0.5"
+    track = "activity = track; track_end = plus_end; bind_only_end = plus_end, 0.5"
     found, document = translated(tmp_path, single(track))
     own = found.linkers[0].kind.hands[0].filament_end
     assert (own.end, own.range, own.binds_there, own.tracks) == ("plus", 500.0, True, True)
     assert document.missing == []
-    found, _ = translated(tmp_path, single("bind_only_end = plus_end; bind_end_range = 0.01"))
-    own = found.linkers[0].kind.hands[0].filament_end
-    assert own.range == 10.0 and own.binds_there and not own.tracks
+    for options in ({}, {"fiber": TUBE, "made": ""}):
+        found, document = translated(
+            tmp_path, single("bind_only_end = both_ends; bind_end_range = 0.01; activity = track", **options)
+        )
+        own = found.linkers[0].kind.hands[0].binding_range
+        assert (own.end, own.range, own.excluded) == ("both", 10.0, False) and document.missing == []
+    found, document = translated(tmp_path, single("hold_shrinking_end = 1"))
+    assert found.linkers[0].kind.hands[0].at_end == "hold" and document.missing == []
     motor = "activity = move; speed = 0.8; hold_growing_end = 1; hold_shrinking_end = 1"
     found, document = translated(tmp_path, single(motor))
     hand = found.linkers[0].kind.hands[0]
@@ -106,7 +111,7 @@ def test_hands_at_ends(tmp_path):
     for hand, options in (
         (track, {"fiber": TUBE, "made": ""}),
         ("bind_only_end = center, 0.1", {}),
-        ("hold_shrinking_end = 1", {}),
+        ("bind_only_end = plus_end; bind_only_free_end = 1", {}),
         ("activity = move; speed = 0.8; hold_growing_end = 0.9", {}),
     ):
         _, document = translated(tmp_path, single(hand, **options))

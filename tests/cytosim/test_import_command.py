@@ -90,11 +90,11 @@ def test_what_is_written_runs(tmp_path, capsys, text):
 
 
 def test_every_place_says_what_was_done(tmp_path, capsys):
-    assert written(tmp_path, NETWORK.replace("diffusion = fast", "diffusion = 10\n    specificity = parallel")) == 0
+    assert written(tmp_path, NETWORK.replace("diffusion = fast", "diffusion = 10\n    specificity = bipolar")) == 0
     said = capsys.readouterr()
     assert said.err == ""
     assert re.search(r"exact: \d+ settings", said.out)
-    assert "rules for pairs of hands" in said.out and "specificity = parallel (line 31)" in said.out
+    assert "rules for pairs of hands" in said.out and "specificity = bipolar (line 31)" in said.out
     lines = (tmp_path / "my.toml").read_text().splitlines()
     # Numbers and names that say themselves what they are.
     unsaid = [line for line in lines if "=" in line and "#" not in line]

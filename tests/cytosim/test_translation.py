@@ -120,8 +120,7 @@ def test_couples_diffuse_in_their_space(tmp_path, dimensions):
 @pytest.mark.parametrize(
     ("couple", "missing"),
     [
-        ("diffusion = fast; specificity = parallel", "rules for pairs of hands"),
-        ("diffusion = fast; trans_activated = 1", "rules for pairs of hands"),
+        ("diffusion = fast; specificity = bipolar", "rules for pairs of hands"),
         ("diffusion = fast; activity = fork; torque = 1, 1", "links that hold an angle (fork)"),
         ("diffusion = fast; confine = surface", "surfaces: linkers on one"),
         ("diffusion = fast; glitter = 3", "couple: glitter"),
@@ -138,9 +137,8 @@ def test_what_couples_cannot_do_here_is_said(tmp_path, couple, missing):
 @pytest.mark.parametrize(
     ("hand", "missing"),
     [
-        ("activity = track", "hands near ends"),
-        ("bind_only_end = plus_end", "hands near ends"),
-        ("activity = slide; mobility = 3", "hands that slip along filaments"),
+        ("activity = track; track_end = plus_end", "hands near ends"),
+        ("activity = slide; diffusion = 3", "hands that diffuse alone"),
         ("activity = nucleate; nucleate = 1, tube", "hands: nucleate"),
     ],
 )
@@ -148,6 +146,25 @@ def test_what_hands_cannot_do_here_is_said(tmp_path, hand, missing):
     own = f"set hand motor {{ binding = 10, 0.05; unbinding = 1, 3; {hand} }}\n"
     _, document = translated(tmp_path, TUBE + own + COUPLE + "new 4 tube { length = 3 }\nnew 50 link\n")
     assert document.missing == [missing]
+
+
+def test_rules_for_pairs_and_hands_that_slide(tmp_path):
+    hands = "set hand slider { binding = 10, 0.05; unbinding = 1; activity = slide; mobility = 0.5 }\n"
+    own = "set couple link { hand1 = motor; hand2 = slider; stiffness = 100; diffusion = fast; length = 0.04; "
+    own += "trans_activated = 1; specificity = antiparallel; activity = bridge }\n"
+    own += "set couple shackle { hand1 = slider; hand2 = motor; stiffness = 100; diffusion = fast; activity = slide }\n"
+    made = "new 4 tube { length = 3 }\nnew 50 link\nnew 9 shackle\n"
+    found, document = translated(tmp_path, TUBE + HAND + hands + own + made)
+    assert document.missing == []
+    first, second = (group.kind for group in found.linkers)
+    assert (first.cosine_range, first.trans_activated, first.reversible) == ((-1.0, -0.5), True, False)
+    friction = 0.602214076 * SECOND / MICROMETER
+    slider = first.hands[1]
+    assert slider.sliding_friction == pytest.approx(2.0 * friction) and slider.at_end == "release"
+    assert not second.has_rules and second.reversible
+    # A step of so long relaxes its spring.
+    step = found.simulation.time_step
+    assert second.hands[0].sliding_friction == pytest.approx(second.stiffness * step) and second.hands[0].holds_at_ends
 
 
 def test_hands_that_hold_walk_on_sites_and_bind_to_some(tmp_path):

@@ -105,7 +105,6 @@ def test_concentrations_take_units():
         *(({name: None}, f"{name} must be a number") for name in ("binding_rate", "reach", "unbinding_rate")),
         *(({name: None}, f"{name} must be a number") for name in ("strain_share", "catch_rate", "speed")),
         ({"walks_backward": None}, "walks_backward must be True or False, but is None"),
-        ({"at_end": None}, "release, hold"),
     ],
 )
 def test_bad_hands_are_refused(changed, message):

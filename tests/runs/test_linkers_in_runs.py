@@ -53,11 +53,28 @@ def test_presets_and_descriptions_are_read():
     assert second.kind.hands[1] == hand
     assert (second.kind.name, second.kind.rest_length, second.kind.same_filament) == ("motor", 30.0, False)
     assert second.kind.stiffness == pytest.approx(0.1 * PN)
-    assert (hand.reach, hand.binds_to, hand.at_end) == (60.0, None, "release")
+    assert (hand.reach, hand.binds_to, hand.holds_at_ends) == (60.0, None, False)
     assert hand.binding_rate == pytest.approx(1e-7) and hand.speed == pytest.approx(-5e-10)
     assert hand.stall_force == pytest.approx(4 * PN)
     assert configuration.filaments[0].linked
     assert changed_keys(configuration, parse_configuration(NETWORK)) == []
+
+
+def test_rules_for_hands_are_read():
+    near = 'binding_range = { end = "both", range = "20 nm", excluded = true }'
+    text = NETWORK.replace(MOTOR, 'hands = [{ X, sliding_friction = "2 pN*s/um" }, { X, near }]')
+    text = text.replace("near", near).replace("X", 'binding_rate = "1 1/s", reach = "60 nm", unbinding_rate = "2 1/s"')
+    text = text.replace(
+        "hands = [{", "cosine_range = [-1, -0.5]\ntrans_activated = true\nreversible = false\nhands = [{"
+    )
+    kind = parse_configuration(text).linkers[1].kind
+    assert (kind.cosine_range, kind.trans_activated, kind.reversible) == ((-1.0, -0.5), True, False)
+    assert kind.hands[0].sliding_friction == pytest.approx(2e9 * PN) and kind.hands[0].holds_at_ends
+    own = kind.hands[1].binding_range
+    assert (own.end, own.range, own.excluded) == ("both", 20.0, True)
+    for changed, message in (("[-1, -0.5]", "cosine_range"), ('"both"', "plus"), ('"20 nm"', "range")):
+        with pytest.raises(InputError, match=message):
+            parse_configuration(text.replace(changed, "[1, 0]" if changed[0] == "[" else '"left"'))
 
 
 def test_every_entry_is_read():

@@ -8,6 +8,7 @@ import numpy as np
 from ...couplings.wall_points import random_points_on
 from ...errors import InputError
 from ...filaments.end_states import ENDS
+from ...kinetics.binding_range import ENDS_OF_RANGE, BindingRange
 from ...kinetics.crosslinker import Crosslinker
 from ...kinetics.hand import AT_ENDS, Hand
 from ...kinetics.hand_at_end import HandAtEnd
@@ -35,6 +36,7 @@ _QUANTITIES = {
         "Speed of walking towards the last node; negative towards the first, zero if it stands.",
     ),
     "stall_force": (units.FORCE, "positive", "Force at which a hand stands still."),
+    "sliding_friction": (units.FRICTION, "positive", "Friction of a hand that slides along filaments."),
     "site_spacing": (units.LENGTH, "positive", "Distance of binding sites, each of which holds one hand."),
     "severing_rate": (
         units.RATE,
@@ -98,6 +100,18 @@ _AT_END = TableKind(
     owner="filament_end of the hand of [[linkers]]",
 )
 
+_RANGE_EXAMPLE = '{ end = "plus", range = "200 nm" }'
+_RANGE = TableKind(
+    "binding_range",
+    (
+        Key("end", Choice(ENDS_OF_RANGE), REQUIRED, "Which one."),
+        Key("range", Quantity(units.LENGTH), REQUIRED, "How near to it is near."),
+        Key("excluded", Flag(), False, "Whether a hand binds to all else; without it, to what is near alone."),
+    ),
+    "The part of filaments to which a hand binds, see `BindingRange`.",
+    owner="binding_range of the hand of [[linkers]]",
+)
+
 KEPT = ("all", "bound", "both hands bound")
 """Linkers that a stage keeps, by how many of their hands are bound at least."""
 HAND = TableKind(
@@ -114,6 +128,7 @@ HAND = TableKind(
             None,
             "What it has to do with an end of filaments that grow: formins, caps, depolymerases.",
         ),
+        Key("binding_range", Inline(_RANGE, _RANGE_EXAMPLE), None, "Near which end it binds; everywhere if not given."),
     ),
     "A hand, see `Hand`.",
     owner="the hand of [[linkers]]",
@@ -154,6 +169,20 @@ LINKERS = TableKind(
         Key("stiffness", Quantity(units.STIFFNESS), None, "Stiffness of the spring between the hands."),
         Key("rest_length", Quantity(units.LENGTH, "zero"), None, "Rest length of that spring."),
         Key("same_filament", Flag(), None, "Whether both hands may bind to one filament."),
+        Key(
+            "cosine_range",
+            Listing(Number("0.5"), "two cosines", "[0.5, 1.0]", 2),
+            None,
+            "Between which the cosine of the angle of two filaments is where the second hand binds: [0.5, 1.0] for "
+            "parallel ones, [-1.0, -0.5] for antiparallel ones.",
+        ),
+        Key("trans_activated", Flag(), None, "Whether the second of hands binds only while the first one is bound."),
+        Key(
+            "reversible",
+            Flag(),
+            None,
+            "Whether hands unbind only where and when they could bind by these two rules; true if not given.",
+        ),
         Key("count", Whole(0, 10**7, "1000"), None, "How many there are."),
         Key(
             "concentration",
@@ -310,7 +339,9 @@ def binds_to(group, linkers):
 
 def _kind(entries):
     preset = PRESETS[entries["type"]] if "type" in entries else None
-    properties = entries.given("stiffness", "rest_length", "same_filament", "name")
+    properties = entries.given(
+        "stiffness", "rest_length", "same_filament", "name", "cosine_range", "trans_activated", "reversible"
+    )
     with entries.naming():
         hands = _hands(entries, preset)
         if hands is not None:
@@ -346,6 +377,10 @@ def _hand(entries, changed):
         at_end = properties["filament_end"]
         with at_end.naming():
             properties["filament_end"] = HandAtEnd(**at_end.given(*_AT_END.names))
+    if "binding_range" in properties:
+        own = properties["binding_range"]
+        with own.naming():
+            properties["binding_range"] = BindingRange(**own.given(*_RANGE.names))
     if properties.get("speed") == 0.0:
         # One that stands still, as in a stage with a drug, keeps what it has for when it walks.
         properties.update(stall_force=None, walks_backward=False)

@@ -127,6 +127,28 @@ void CylinderChainBindingForce::setHandSiteSpacing(int hand, double spacing) {
     handOf(hand).siteSpacing = spacing;
 }
 
+void CylinderChainBindingForce::setHandBindingRange(int hand, int end, double range, bool excluded) {
+    requireOfBinding(end >= -1 && end <= 2, "Illegal end: "+to_string(end));
+    requireNotNegative(range, "range of binding");
+    handOf(hand).bindingRange = {end, range, excluded};
+}
+
+void CylinderChainBindingForce::getHandBindingRange(int hand, int& end, double& range, bool& excluded) const {
+    const BindingRange& own = getHand(hand).bindingRange;
+    end = own.end;
+    range = own.range;
+    excluded = own.excluded;
+}
+
+double CylinderChainBindingForce::getHandSliding(int hand) const {
+    return getHand(hand).slidingFriction;
+}
+
+void CylinderChainBindingForce::setHandSliding(int hand, double friction) {
+    requireNotNegative(friction, "friction");
+    handOf(hand).slidingFriction = friction;
+}
+
 int CylinderChainBindingForce::addLinkerType(int hand1, int hand2, double restLength, double stiffness,
         bool sameChain) {
     requireOfBinding(hand1 >= -1 && hand1 < getNumHands(), "Illegal hand: "+to_string(hand1));
@@ -171,6 +193,27 @@ void CylinderChainBindingForce::setLinkerTypeReservoir(int type, double volume, 
     requireOfBinding(concentration == -1 || types[type].hands[0] >= 0, "Anchored linkers have no concentration");
     types[type].volume = volume;
     types[type].concentration = concentration;
+}
+
+void CylinderChainBindingForce::getLinkerTypeRules(int type, double& leastCosine, double& largestCosine,
+        bool& transActivated, bool& reversible) const {
+    const LinkerType& own = getLinkerType(type);
+    leastCosine = own.leastCosine;
+    largestCosine = own.largestCosine;
+    transActivated = own.transActivated;
+    reversible = own.reversible;
+}
+
+void CylinderChainBindingForce::setLinkerTypeRules(int type, double leastCosine, double largestCosine,
+        bool transActivated, bool reversible) {
+    ASSERT_VALID_INDEX(type, types);
+    requireOfBinding(-1 <= leastCosine && leastCosine <= largestCosine && largestCosine <= 1,
+            "Cosines must ascend, between -1 and 1");
+    LinkerType& own = types[type];
+    own.leastCosine = leastCosine;
+    own.largestCosine = largestCosine;
+    own.transActivated = transActivated;
+    own.reversible = reversible;
 }
 
 void CylinderChainBindingForce::getLinkerTypeDiffusion(int type, double& diffusion, bool& planar) const {

@@ -85,6 +85,8 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
             require(hand.siteSpacing == 0 || contours->getLength(chain)/hand.siteSpacing < MOST_SITES, "Chain "+
                     to_string(chain)+" would have more than a thousand million sites of hand "+to_string(i)+
                     ": sites so near to each other cannot be told apart");
+        require(hand.slidingFriction == 0 || (hand.siteSpacing == 0 && hand.speed == 0), "Hand "+to_string(i)+
+                " slides: it has neither sites nor a speed");
         if (hand.siteSpacing > 0)
             spacings.insert(hand.siteSpacing);
         require(spacings.size() <= MOST_SPACINGS, "Hands have more than "+to_string(MOST_SPACINGS)+

@@ -26,6 +26,10 @@ static void write(const CylinderChainBindingForce& force, SerializationNode& nod
         child.setIntProperty("end", atEnd.end).setDoubleProperty("endRange", atEnd.range)
                 .setBoolProperty("bindsAtEnd", atEnd.bindsThere).setBoolProperty("tracksEnd", atEnd.tracks)
                 .setIntProperty("freeState", atEnd.freeState).setIntProperty("heldState", atEnd.heldState);
+        child.setDoubleProperty("slidingFriction", hand.slidingFriction)
+                .setIntProperty("rangeEnd", hand.bindingRange.end)
+                .setDoubleProperty("bindingRange", hand.bindingRange.range)
+                .setBoolProperty("rangeExcluded", hand.bindingRange.excluded);
         for (int chain : atEnd.changes)
             child.createChildNode("ChainWithEnd").setIntProperty("index", chain);
         for (int chain : hand.chains)
@@ -49,6 +53,9 @@ static void write(const CylinderChainBindingForce& force, SerializationNode& nod
                 .setDoubleProperty("stiffness", type.stiffness).setBoolProperty("sameChain", type.sameChain)
                 .setDoubleProperty("volume", type.volume).setDoubleProperty("concentration", type.concentration)
                 .setDoubleProperty("diffusion", type.diffusion).setBoolProperty("planar", type.planar);
+        child.setDoubleProperty("leastCosine", type.leastCosine)
+                .setDoubleProperty("largestCosine", type.largestCosine)
+                .setBoolProperty("transActivated", type.transActivated).setBoolProperty("reversible", type.reversible);
     }
     SerializationNode& anchors = node.createChildNode("Anchors");
     for (int i = 0; i < force.getNumAnchors(); i++) {
@@ -89,6 +96,9 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
         force->setHandAtEnd(number, hand.getIntProperty("end"), hand.getDoubleProperty("endRange"),
                 hand.getBoolProperty("bindsAtEnd"), hand.getBoolProperty("tracksEnd"),
                 hand.getIntProperty("freeState"), hand.getIntProperty("heldState"), withEnds);
+        force->setHandSliding(number, hand.getDoubleProperty("slidingFriction"));
+        force->setHandBindingRange(number, hand.getIntProperty("rangeEnd"), hand.getDoubleProperty("bindingRange"),
+                hand.getBoolProperty("rangeExcluded"));
         force->setHandSiteSpacing(number, hand.getDoubleProperty("siteSpacing"));
         force->setHandSevering(number, hand.getDoubleProperty("severingRate"));
     }
@@ -98,8 +108,10 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
                 type.getBoolProperty("sameChain"));
         force->setLinkerTypeReservoir(number, type.getDoubleProperty("volume"),
                 type.getDoubleProperty("concentration"));
-        if (type.hasProperty("diffusion"))
-            force->setLinkerTypeDiffusion(number, type.getDoubleProperty("diffusion"), type.getBoolProperty("planar"));
+        force->setLinkerTypeDiffusion(number, type.getDoubleProperty("diffusion"), type.getBoolProperty("planar"));
+        force->setLinkerTypeRules(number, type.getDoubleProperty("leastCosine"),
+                type.getDoubleProperty("largestCosine"), type.getBoolProperty("transActivated"),
+                type.getBoolProperty("reversible"));
         for (auto& wall : type.getChildren())
             force->addLinkerTypeWall(number, wall.getStringProperty("shape"), Vec3(wall.getDoubleProperty("x"),
                     wall.getDoubleProperty("y"), wall.getDoubleProperty("z")), Vec3(wall.getDoubleProperty("vx"),
@@ -128,4 +140,4 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
 }
 
 static const bool isBindingForceRegistered =
-        registerProxy<CylinderChainBindingForce>("CylinderChainBindingForce", 3, write, readBindingForce);
+        registerProxy<CylinderChainBindingForce>("CylinderChainBindingForce", 4, write, readBindingForce);

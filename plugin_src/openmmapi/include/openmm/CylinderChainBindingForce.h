@@ -163,6 +163,26 @@ public:
     void getHandAtEnd(int hand, int& end, double& range, bool& bindsThere, bool& tracks, int& freeState,
             int& heldState, std::vector<int>& numbers) const;
     /**
+     * Set to which part of filaments a kind of hands binds.  It binds to all of them unless this is called.
+     *
+     * @param hand      the number of the kind
+     * @param end       the plus end (1), the minus end (0), or either (2), or -1 if it binds to all of a filament
+     * @param range     how near to the end is near, measured in nm
+     * @param excluded  whether it binds to all but what is near; else to what is near alone
+     */
+    void setHandBindingRange(int hand, int end, double range, bool excluded);
+    /** Get to which part of filaments a kind of hands binds, see setHandBindingRange(). */
+    void getHandBindingRange(int hand, int& end, double& range, bool& excluded) const;
+    /** Get the friction of hands of a kind that slide, measured in kJ ps/mol/nm^2, or 0 if they do not. */
+    double getHandSliding(int hand) const;
+    /**
+     * Let hands of a kind slide along filaments: at random, and by the force of the spring, over their friction.
+     *
+     * @param hand      the number of the kind, which has neither sites nor a speed
+     * @param friction  the friction, measured in kJ ps/mol/nm^2, or 0 if they do not slide
+     */
+    void setHandSliding(int hand, double friction);
+    /**
      * Get the rate at which hands of a kind cut filaments, see setHandSevering().
      */
     double getHandSevering(int hand) const;
@@ -227,6 +247,23 @@ public:
      * @param concentration  their number per nm^3 if that does not change, or -1 if there are as many as were added
      */
     void setLinkerTypeReservoir(int type, double volume, double concentration);
+    /** Get which pairs of places linkers of a type join, and in which order their hands bind. */
+    void getLinkerTypeRules(int type, double& leastCosine, double& largestCosine, bool& transActivated,
+            bool& reversible) const;
+    /**
+     * Set which pairs of places linkers of a type join, and in which order their hands bind.  There are no such rules
+     * unless this is called.
+     *
+     * @param type            the number of the type
+     * @param leastCosine     the second hand to bind does so where the cosine of the angle between both filaments is at
+     *                        least this
+     * @param largestCosine   and at most this
+     * @param transActivated  whether the second hand of the type binds only while the first one is bound, and that one
+     *                        only before it
+     * @param reversible      whether hands unbind only where and when they could bind by these rules, so that one way
+     *                        is as likely as the other; else they always unbind
+     */
+    void setLinkerTypeRules(int type, double leastCosine, double largestCosine, bool transActivated, bool reversible);
     /**
      * Get how linkers of a type diffuse while they are not bound.
      *
