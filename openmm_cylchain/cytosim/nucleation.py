@@ -2,10 +2,11 @@
 
 import math
 
+from .directions import fixed_direction
 from .document import EXACT, NEAREST, Note, quantity
 from .filaments import add_growth, add_type, first_length, segment_of, shared_growth
 from .grammar import read_commands
-from .places import fixed_direction, region_of
+from .places import region_of
 from .settings import Settings
 
 _EVENTS = "events during a run"

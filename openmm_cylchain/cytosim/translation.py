@@ -9,11 +9,11 @@ from ..errors import InputError
 from .bodies import KINDS as BODY_KINDS
 from .bodies import add_bodies
 from .document import LEFT_OUT, NEAREST, Document
+from .drawing import Draw
 from .filaments import add_filaments
 from .growth import add_monomers
 from .linkers import add_linkers
 from .nucleation import add_event
-from .places import Draw
 from .script import New, count_of, read_script
 from .settings import Settings
 from .simulation import (
