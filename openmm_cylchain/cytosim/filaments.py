@@ -16,7 +16,7 @@ from .directions import (
 )
 from .document import EXACT, NEAREST, Note, point, quantity
 from .grammar import ScriptError
-from .growth import longest_of, read_growth, same_growth
+from .growth import longest_of, read_growth, same_growth, still_growth
 from .places import draw_inside, region_of, unknown_position
 from .script import count_of
 from .settings import OFF
@@ -88,9 +88,15 @@ def add_on_body(translation, fiber, options, length, count, growing):
     return number, whole
 
 
-def shared_growth(translation, fiber, options):
-    """The Growing of fibers that are created with options, one for all that share monomers; None without growth."""
+def shared_growth(translation, fiber, options, begins=False):
+    """The Growing of fibers that are created with options, one for all that share monomers.
+
+    None without growth, but for those that begin during a run.
+    """
     growing = read_growth(translation, fiber, options)
+    if growing is None and begins:
+        growing = still_growth(fiber)
+        growing.entries.append(("severing_rate", "0 1/(um*s)", Note(EXACT, "it neither grows nor shrinks")))
     if growing is None:
         return None
     for other in translation.growings:
@@ -281,8 +287,8 @@ def add_growth(translation, name, table, fiber, length, growing):
     inner = translation.document.table(f"[{name}.growth]", table.line)
     inner.add("monomers", growing.name)
     inner.add("longest", quantity(longest, "um"), note)
-    least = fiber.settings.number("min_length", default=0.008)
-    if 0.0 < least < length:
+    least = min(fiber.settings.number("min_length", default=0.008), length)
+    if least > 0.0:
         inner.add("shortest", quantity(max(least, growing.monomer), "um"), Note(EXACT, "min_length", fiber.line))
     for key, value, own in growing.entries:
         inner.add(key, value, own)

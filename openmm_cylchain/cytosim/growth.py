@@ -125,10 +125,16 @@ def _of_still(translation, fiber, cutting):
     # Fibers that do nothing but be cut.
     if cutting is None:
         return None
+    growing = still_growth(fiber)
+    _add_cutting(translation, growing, cutting)
+    return growing
+
+
+def still_growth(fiber):
+    """The Growing of fibers whose ends neither grow nor shrink."""
     growing = Growing(fiber.name, fiber.settings, _usual_monomer(fiber.settings))
     for end in _ENDS:
         _cap(growing, end)
-    _add_cutting(translation, growing, cutting)
     return growing
 
 

@@ -12,6 +12,9 @@ from .document import point, quantity
 from .drawing import TRIES, Words, draw_where, flat, split_condition
 from .spaces import disc_region
 
+_THIN = 1e-6
+"""Half of an edge in um of a box that is none."""
+
 
 def _axis(letter, along, across):
     # A vector with one component along an axis, and two across it.
@@ -286,6 +289,52 @@ def region_of(text, draw):
     if name == "cylinder" and len(numbers) == 2 and draw.dimensions == 3 and min(numbers) > 0.0:
         return disc_region(numbers[1], numbers[0], center, [int(letter == own) for own in "XYZ"])
     return None
+
+
+def box_of(text, draw):
+    """A region in which first nodes of filaments are, as a table: that of a POSITION, flat or thin ones as well.
+
+    None where it is neither a box nor a sphere.
+    """
+    space = draw.space
+    if text in (None, "inside", "random"):
+        if space is None:
+            return None
+        if draw.dimensions == 3 and space.region is not None:
+            return space.region if space.region["shape"] in ("sphere", "box") else None
+        if space.shape not in ("square", "periodic", "strip"):
+            return None
+        return box_around(space.middle, space.half)
+    region = region_of(text, draw) if draw.dimensions == 3 else None
+    if region is not None and region["shape"] in ("sphere", "box"):
+        return region
+    words, center = Words(text), np.zeros(3)
+    if not words.word[:1].isalpha():
+        place = words.vector()
+        return None if words.word else box_around(place, np.zeros(3))
+    name, letter = _named(words.take())
+    numbers = words.numbers()
+    if words.word == "at":
+        words.take()
+        center = words.vector()
+    sizes = np.array((*numbers, 0.0, 0.0, 0.0)[:3])
+    if words.word or (name in _NEED_NUMBER and not numbers):
+        return None
+    if name in ("center", "origin"):
+        sizes = np.zeros(3)
+    elif name in ("line", "cylinder") and sizes[1] == 0.0:
+        sizes = _axis(letter if name == "cylinder" else "X", sizes[0], 0.0)
+    elif name == "square":
+        sizes = np.array([*[numbers[0] if numbers else 1.0] * 2, 0.0])
+    elif name != "rectangle":
+        return None
+    return box_around(center, 0.5 * sizes)
+
+
+def box_around(center, half):
+    """A box as a table, with next to no width where it has none."""
+    half = np.maximum(np.abs(half), _THIN)
+    return {"shape": "box", "lower": point(center - half), "upper": point(center + half)}
 
 
 def draw_inside(text, draw, keep=True):

@@ -4,7 +4,7 @@ import math
 
 from ..errors import InputError
 from .document import EXACT, LEFT_OUT, NEAREST, Note, quantity
-from .settings import OFF
+from .settings import CONFINED, OFF
 
 _BOLTZMANN = 1.380649e-5
 """In pN um/K."""
@@ -14,7 +14,6 @@ _MOST_STEPS_PER_FRAME = 10**7
 _STILL = 1e8
 """In pN s/um^2: a viscosity in which fibers stand still."""
 _NOT_SOLVED = ("off", "0")
-_CONFINED = ("inside", "all_inside", "1")
 
 
 def thermal_energy(simul):
@@ -133,7 +132,7 @@ def _confinement(translation, fiber, key):
     settings.values(f"{key}_stiffness")
     if mode in OFF:
         return None
-    if mode not in _CONFINED:
+    if mode not in CONFINED:
         translation.left_out(f"{key} = {mode} of {fiber.name}", line, f"surfaces: confine = {mode}")
         return None
     stiffness = settings.number((key, 1), f"{key}_stiffness", default=0.0)
@@ -156,7 +155,7 @@ def _add_walls_of_bodies(translation, found, fibers):
             if of_all:
                 text = f"{name} is not confined in Cytosim, but walls of all filaments are for all bodies here"
                 translation.document.note(NEAREST, text, body.line)
-        elif mode not in _CONFINED:
+        elif mode not in CONFINED:
             translation.left_out(f"confine = {mode} of {name}", line, f"surfaces: confine = {mode}")
         elif space not in of_all and (found or fibers):
             text = f"confine = {mode} of {name}: walls of bodies are those of all filaments here"
