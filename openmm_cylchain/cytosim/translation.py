@@ -63,6 +63,8 @@ class Translation:
         self.nucleated = []
         # How many filaments and tables of bodies there are when what is translated is created; None for all.
         self.bodies, self.there = [], None
+        # Places on filaments of linkers that begin there, by the names of singles and couples.
+        self.attached = {}
         self.growings, self.made, self.filament_count, self.start_files = [], [], 0, {}
         self._spaces, self._type_names = {}, {}
         self.dimensions = self._find_dimensions(dimensions)
