@@ -41,7 +41,8 @@ def rotation_of(words, draw):
 
 
 _AXES = ("X", "Y", "Z")
-_ROTATIONS = ("off", "identity", "none", "axis", "angle", "degree", "quat")
+ROTATIONS = ("off", "identity", "none", "random", "axis", "angle", "degree", "quat", "vector", *_AXES)
+"""Words with which rotations begin."""
 
 
 def _about(axis, angle):
@@ -80,7 +81,7 @@ def draw_orientation(options, place, draw):
     """A rotation matrix of Settings with KEYS, of something at a place."""
     text = options.text(*KEYS, default="random")
     words = Words(text)
-    if "direction" not in options and words.word in (*_ROTATIONS, *_AXES, "random"):
+    if "direction" not in options and words.word in ROTATIONS:
         return rotation_of(words, draw)
     return frame_of(draw_direction(text, place, draw), np.array([0.0, 0.0, 1.0]))
 
@@ -91,7 +92,7 @@ def draw_second_orientation(options, place, draw):
     if text is None:
         return None
     words = Words(text)
-    if words.word in (*_ROTATIONS, *_AXES, "random"):
+    if words.word in ROTATIONS:
         return rotation_of(words, draw)
     return towards(draw_direction(text, place, draw), draw)
 
@@ -137,7 +138,9 @@ def draw_direction(text, place, draw):
 
 
 def _blurred(text, place, draw):
-    # With Gaussian noise across.
+    # One of several, with Gaussian noise across.
+    if " or " in text:
+        text = text.split(" or ")[int(draw.generator.integers(0, text.count(" or ") + 1))]
     text, _, width = text.partition(" blur ")
     vector = _one_direction(text.strip(), place, draw)
     if width:
@@ -154,8 +157,6 @@ def _blurred(text, place, draw):
 def _one_direction(text, place, draw):
     if text == "random":
         return draw.unit()
-    if " or " in f" {text} ":
-        text = text.split(" or ")[int(draw.generator.integers(0, text.count(" or ") + 1))]
     fixed = fixed_direction(text)
     if fixed is not None:
         vector, opposite = np.array(fixed[0], dtype=float), fixed[1]
@@ -166,7 +167,7 @@ def _one_direction(text, place, draw):
     words = text.split()
     if not words:
         raise draw.mistake("a direction is empty.")
-    if words[0] in _ROTATIONS:
+    if words[0] in ROTATIONS:
         return rotation_of(Words(text), draw)[:, 0]
     if words[-1] in ("XY", "XZ", "YZ") and words[:-1] in ([], ["parallel"]):
         vector = flat(draw, np.array([draw.generator.normal() if own in words[-1] else 0.0 for own in "XYZ"]))

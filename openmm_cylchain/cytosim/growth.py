@@ -344,6 +344,8 @@ def add_monomers(translation, growings):
         if not math.isfinite(total):
             table.add("concentration", quantity(_REFERENCE, "uM"), Note(EXACT, "which gives the speeds above"))
             continue
+        if total <= 0.0:
+            raise growing.settings.mistake("total_polymer", "must be positive.")
         free = max(0.0, 1.0 - growing.length / total)
         table.add("concentration", quantity(_REFERENCE * free, "uM"), Note(EXACT, f"{free:.3g} of the polymer is free"))
         volume = total / growing.monomer / (_REFERENCE * _PER_UM3)

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from .directions import rotation_of, towards
+from .directions import ROTATIONS, rotation_of, towards
 from .document import point, quantity
 from .drawing import TRIES, Words, draw_where, flat, split_condition
 from .spaces import disc_region
@@ -183,6 +183,7 @@ _PRIMITIVES = {
     "gradient": _along_x(_gradient),
     "exponential": _along_x(lambda x, first, scale: math.exp((first - x) / scale) if x >= first else 0.0),
 }
+_CHANGES = ("at", "blur", "to", "or", "add", "flip", "turn", "align")
 _ON_SPHERES = ("surface", "edge")
 _WITH_AXIS = {"cylinder": "X", "disc": "Z", "circle": "Z", "ring": "X", "cap": "Z"}
 _NEED_NUMBER = {"ball", "cylinder", "disc", "circle", "sphere", "arc", "line", "rectangle", "ring", "ellipse"}
@@ -196,7 +197,11 @@ def unknown_position(text, space):
         return None
     while words.word:
         word = words.take()
-        if word in ("at", "blur", "to", "or", "add", "flip", "turn", "align", "angle", "degree"):
+        if word == "turn":
+            while words.word in ROTATIONS:
+                words.take()
+                words.numbers(4)
+        if word in _CHANGES:
             words.numbers()
             continue
         if _named(word)[0] not in _PRIMITIVES:
