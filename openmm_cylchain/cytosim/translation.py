@@ -44,6 +44,7 @@ _NEEDS = {
     ("fiber", "glue"): "surfaces: glue",
 }
 """What keys need that nothing here asks for, by the kind of what has them."""
+_DYNAMIC = ("dynamic_ellipse", "dynamic_sphere")
 _WITH_EVERY_LENGTH = ("rectangle", "square", "periodic", "strip", "semi_periodic", "ellipse", "dice")
 _SEED = 1
 
@@ -228,7 +229,11 @@ class Translation:
                 continue
             own = self.script.named(new.name, "space", new.line)
             shape = own.settings.text("shape", "geometry", default="")
-            space = make_space(shape, [new.settings, own.settings], self.dimensions, self._folder)
+            still = shape.removeprefix("dynamic_") if shape in _DYNAMIC else shape
+            space = make_space(still, [new.settings, own.settings], self.dimensions, self._folder)
+            if space is not None and still != shape:
+                own.settings.take_rest()
+                self.left_out(f"forces on {new.name}, which keeps its shape", new.line, f"spaces: {shape}")
             if new.name not in self._spaces:
                 self._spaces[new.name] = space
             if space is None:
