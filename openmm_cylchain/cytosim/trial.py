@@ -2,6 +2,8 @@
 
 import contextlib
 import io
+import time
+import warnings
 
 from ..errors import InputError, InstabilityError
 from .document import LEFT_OUT, NEAREST, Note, number_in, quantity
@@ -45,17 +47,32 @@ def _divided(entry, parts):
 
 def _trouble(configuration):
     # Why a run does not take its first steps, in a sentence; None if it does, or if they take too long to know.
-    from ..runs.created_simulation import begin, create_simulation
+    from ..runs.created_simulation import create_simulation
     from ..runs.dry_run import take_first_steps
+    from ..runs.relaxation import relaxed_positions
     from ..runs.stages import stages_of
 
+    start = time.process_time()
+
+    def stop(_):
+        if time.process_time() - start > _MOST_SECONDS:
+            raise _TooLongError
+
     try:
-        with contextlib.redirect_stderr(io.StringIO()):
+        with contextlib.redirect_stderr(io.StringIO()), warnings.catch_warnings():
+            # The run itself warns.
+            warnings.simplefilter("ignore")
             stages = stages_of(configuration)
             simulation, built = create_simulation(stages[0].configuration)
-            begin(stages[0].configuration, simulation, built)
+            simulation.context.setPositions(relaxed_positions(stages[0].configuration, built, stop))
             for _ in take_first_steps(stages, (simulation, built), _STEPS, _MOST_SECONDS):
                 pass
     except (InputError, InstabilityError) as error:
         return str(error)
+    except _TooLongError:
+        pass
     return None
+
+
+class _TooLongError(Exception):
+    pass
