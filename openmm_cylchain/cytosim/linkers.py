@@ -9,6 +9,7 @@ from .attached import GROWING, PLACED, place_along
 from .bodies import attach_to_bodies, point_of_base
 from .document import EXACT, LEFT_OUT, NEAREST, Note, point, quantity
 from .hands import read_hand
+from .nucleation import add_nucleators
 from .places import draw_inside, unknown_position
 from .script import count_of
 from .settings import OFF
@@ -16,6 +17,8 @@ from .settings import OFF
 _PAIRS = "rules for pairs of hands"
 _MOST_ANCHORS = 50_000
 _HALF_OF_NO_SPACE = 5.0
+_NEAR, _SOON = "10 nm", "1e+06 1/s"
+"""Within what, and how soon, a nucleator holds what it has made."""
 _RANGE_AND_LAW = (
     "k_on/(2 reach) exp(-U/kT) for each length within reach of a hand that is tied, which has an equilibrium; in "
     "Cytosim it is k_on wherever a fiber is within reach, however strained"
@@ -38,6 +41,7 @@ class Linked:
     bound: int = 0
     points: list = field(default_factory=list)
     places: list = field(default_factory=list)
+    nucleators: list = field(default_factory=list)
 
     @property
     def held(self):
@@ -71,9 +75,11 @@ def add_linkers(translation, news):
         for bodies in translation.bodies:
             if bodies.singles.get(name):
                 _table_on_bodies(translation, own, bodies, bodies.singles[name])
+        if linked.nucleators:
+            _table_of_nucleators(translation, own, linked)
         if linked.points or linked.count:
             (_couple_table if own.kind == "couple" else _single_table)(translation, own, linked)
-        elif name not in on_bodies:
+        elif name not in on_bodies and not linked.nucleators:
             own.settings.take_rest()
 
 
@@ -185,7 +191,17 @@ def _singles(translation, own, new, linked):
     if not fixed:
         linked.count += count
         return
-    linked.points += _points(translation, new, count, len(linked.points))
+    points, hand = _points(translation, new, count, len(linked.points)), _nucleator(translation, own)
+    if hand is not None and add_nucleators(translation, new, hand.settings, points):
+        linked.nucleators += points
+    else:
+        linked.points += points
+
+
+def _nucleator(translation, own):
+    # The Property of its hand if that makes fibers.
+    hand = translation.script.properties.get(own.settings.text("hand"))
+    return hand if hand is not None and hand.settings.text("activity") == "nucleate" else None
 
 
 def _join_body(translation, own, new, count):
@@ -274,6 +290,21 @@ def _single_table(translation, own, linked):
         _add_count(translation, table, own, linked, hand)
     for note in hand.notes:
         table.comment(note)
+
+
+def _table_of_nucleators(translation, own, linked):
+    # They hold the minus ends of what they make.
+    hand = translation.script.properties[own.settings.text("hand")].settings
+    table = translation.document.table("[[linkers]]", own.line)
+    table.add("name", own.name, Note(EXACT, f"single {own.name}", own.line))
+    _add_spring(translation, table, own)
+    types = dict.fromkeys([translation.type_name(hand.text(("nucleate", 1)))])
+    at_end = {"end": "minus", "range": _NEAR, "binds_there": True, "tracks": True}
+    held = {"binding_rate": _SOON, "reach": _NEAR, "unbinding_rate": "0 1/s", "filament_end": at_end}
+    note = Note(NEAREST, "it binds at once to the first node of what begins where it is")
+    table.add("hand", {**held, "binds_to": list(types)}, note)
+    table.add("anchors", [point(place) for place in linked.nucleators], Note(EXACT, "activity = fixed"))
+    _read_rest(own.settings)
 
 
 def _table_on_bodies(translation, own, bodies, points):

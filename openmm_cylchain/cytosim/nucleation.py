@@ -12,7 +12,7 @@ from .settings import CONFINED, Settings
 
 _EVENTS = "events during a run"
 _WITHOUT_EFFECT = ("report", "write", "export", "save", "mark")
-_MOST_PLACES = 500
+_MOST_PLACES, _MOST_NUCLEATORS = 500, 500
 
 
 def add_event(translation, new):
@@ -60,9 +60,38 @@ def _begins(translation, new, command, rate):
     if command.verb != "new" or fiber is None or fiber.kind != "fiber" or len(words) > 1:
         return False
     options = Settings.of(f"new {fiber.name}", command.line, command.block)
+    return _add_nucleation(translation, new, fiber, options, rate)
+
+
+def add_nucleators(translation, new, hand, places):
+    """Add hands that make fibers, and are tied to places: whether they could be added.
+
+    Each of them has a [[nucleation]] of its own, of one filament at a time, as it holds one as long as that is there.
+    """
+    rate, name = hand.number("nucleate", default=0.0), hand.text(("nucleate", 1), default="")
+    fiber, block = translation.script.properties.get(name), hand.block("nucleate", 2)
+    stays = hand.number("unbinding_rate", "unbinding", default=0.0) == 0.0
+    holds = hand.text("hold_end", "track_end", default="minus_end") == "minus_end"
+    if rate <= 0.0 or fiber is None or fiber.kind != "fiber" or not (stays and holds):
+        return False
+    if len(places) > _MOST_NUCLEATORS:
+        return False
+    note = Note(EXACT, f"nucleate = {rate:g}, of one {new.name}", hand.line_of("nucleate"))
+    for place in places:
+        options = Settings.of(f"new {name}", hand.line_of("nucleate"), block)
+        options.set("position", [" ".join(f"{own:.9g}" for own in place)], new.line)
+        if not _add_nucleation(translation, new, fiber, options, (rate, note), 1):
+            return False
+    for key in ("activity", "binding_rate", "binding", "binding_range", "unbinding_force", "nucleate"):
+        hand.values(key)
+    return True
+
+
+def _add_nucleation(translation, new, fiber, options, rate, places=None):
+    # Whether it could be added; ``places`` of filaments, or as many as begin.
     growing = shared_growth(translation, fiber, options, begins=True)
     space = translation.space(options.text(("position", 1)))
-    draw = translation.draw_in(space, command.line)
+    draw = translation.draw_in(space, options.line)
     text = options.text("position")
     everywhere = text is None and translation.dimensions == 3 and space is not None and space.shape == "periodic"
     region, (frequency, note) = None if everywhere else box_of(text, draw), rate
@@ -85,11 +114,14 @@ def _begins(translation, new, command, rate):
     for sign in signs:
         table = translation.document.table("[[nucleation]]", new.line)
         share = frequency / len(signs)
-        places = min(_MOST_PLACES, math.ceil(1.2 * share * translation.duration) + 5)
-        table.add("count", places, Note(NEAREST, "places: so many can be there at once"))
+        most = min(_MOST_PLACES, math.ceil(1.2 * share * translation.duration) + 5)
+        table.add(
+            "count", places or most, Note(NEAREST, "places: so many can be there at once") if not places else None
+        )
         table.add("total_rate", quantity(share, "1/s"), note)
         if region is not None:
-            table.add("inside", region, Note(NEAREST, "where the first node is; in Cytosim, the middle"))
+            where = Note(NEAREST, "where the first node is; in Cytosim, the middle") if not places else Note(EXACT, "")
+            table.add("inside", region, where)
         if fixed is not None:
             note_of_two = Note(EXACT, "half of them have the opposite direction" if len(signs) > 1 else "")
             table.add("direction", [sign * float(own) for own in fixed[0]], note_of_two)
@@ -97,7 +129,7 @@ def _begins(translation, new, command, rate):
             table.add("planar", True, Note(EXACT, "two dimensions: they stay in the plane z = 0"))
         add_type(translation, table, fiber, segment, length)
         whole = max(2, round(length / growing.monomer)) * growing.monomer
-        table.add("length", quantity(whole, "um"), Note(EXACT, "", command.line))
+        table.add("length", quantity(whole, "um"), Note(EXACT, "", options.line))
         add_growth(translation, "nucleation", table, fiber, whole, growing)
     for key in ("reference", "placement", "plus_end", "minus_end", "end_state"):
         options.values(key)

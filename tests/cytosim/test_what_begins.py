@@ -105,6 +105,37 @@ def test_hands_begin_where_they_are_attached(tmp_path):
     assert table.filaments[8:, 1].tolist() == [0, -1, -1]
 
 
+NUCLEATOR = """set hand maker { unbinding = 0, 3; activity = nucleate; 
+ nucleate = 40, tube, ( length = 0.2; plus_end = grow ) }
+set single seed { hand = maker; activity = fixed; stiffness = 1000 }
+new 20 seed { position = ball 3 }
+"""
+
+
+def test_nucleators_make_one_fiber_each_and_hold_it(tmp_path):
+    found, document = translated(tmp_path, GROWING + NUCLEATOR, run="run 100 system\n")
+    assert document.missing == []
+    assert [group.count for group in found.filaments] == [1] * 20
+    simulation, built = create_simulation(found)
+    begin(found, simulation, built)
+    there = []
+    for _ in range(4):
+        simulation.step(15)
+        growth = built.filaments.in_context(simulation.context).growth()
+        there.append(int(np.sum(growth.nodes > 0)))
+    # Each at its own rate: after a time t, a share of 1 - exp(-rate t) has one.
+    expected = 20 * (1.0 - np.exp(-40 * 0.015 * np.arange(1, 5)))
+    assert np.all(np.abs(there - expected) < 4 * np.sqrt(20 * 0.25))
+    table = built.filaments.in_context(simulation.context).linkers()
+    bound = np.flatnonzero(table.filaments[:, 1] >= 0)
+    assert len(bound) >= there[-1] - 1
+    positions = simulation.context.getState(positions=True).getPositions(asNumpy=True)._value
+    for number in bound:
+        first = positions[built.filaments.node_indices[table.filaments[number, 1]][0]]
+        assert np.linalg.norm(first - found.linkers[0].anchors[number]) < 20.0
+        assert table.arc_lengths[number, 1] < 10.0
+
+
 def test_steps_are_shorter_where_the_first_ones_have_no_solution(tmp_path):
     # An aster outside of its cell, whose walls push it in.
     text = "set fiber tube { rigidity = 30; segmentation = 1; confine = inside, 100 }\nset solid core { }\n"
