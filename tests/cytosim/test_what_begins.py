@@ -105,7 +105,7 @@ def test_hands_begin_where_they_are_attached(tmp_path):
     assert table.filaments[8:, 1].tolist() == [0, -1, -1]
 
 
-NUCLEATOR = """set hand maker { unbinding = 0, 3; activity = nucleate; 
+NUCLEATOR = """set hand maker { unbinding = 0, 3; activity = nucleate;
  nucleate = 40, tube, ( length = 0.2; plus_end = grow ) }
 set single seed { hand = maker; activity = fixed; stiffness = 1000 }
 new 20 seed { position = ball 3 }
