@@ -214,7 +214,9 @@ def _add_interpolated(translation, options, shape):
 
 def _single_of(translation, options, key, text):
     # How many, the name of a single and what stands behind it; none if there is no such single.
-    words = _ONE_SINGLE.fullmatch(text.strip().removeprefix("(").removesuffix(")").strip())
+    inner = text.strip()
+    inner = inner[1:-1].strip() if inner[:1] == "(" and inner[-1:] == ")" else inner
+    words = _ONE_SINGLE.fullmatch(inner)
     found = None if words is None else translation.script.properties.get(words[2])
     if found is None or found.kind != "single":
         translation.left_out(f"{text!r} of {key}", options.line_of(key), "bodies: what is attached to them")
