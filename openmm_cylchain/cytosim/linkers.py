@@ -200,8 +200,8 @@ def _singles(translation, own, new, linked):
 
 def _nucleator(translation, own):
     # The Property of its hand if that makes fibers.
-    hand = translation.script.properties.get(own.settings.text("hand"))
-    return hand if hand is not None and hand.settings.text("activity") == "nucleate" else None
+    hand = translation.script.properties.get(own.settings.peek("hand"))
+    return hand if hand is not None and hand.settings.peek("activity") == "nucleate" else None
 
 
 def _join_body(translation, own, new, count):
