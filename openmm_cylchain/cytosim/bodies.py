@@ -282,10 +282,9 @@ def _add_table(translation, own, new, count, shape):
 
 
 def _steric_line(translation, table, settings):
-    steric = settings.text("steric")
     if translation.script.simul.text("steric") in OFF:
         return None
-    if steric not in OFF:
+    if settings.text("steric") not in OFF:
         return settings.line_of("steric")
     table.add("contacts", False, Note(EXACT, "steric is off"))
     return None
