@@ -26,6 +26,7 @@ CASES = [
     ("filaments_in_a_vesicle", "vesicle", 40, 40, 24 + 24 * (13 + 1), 24 * 12),
     ("contractile_bundle", "bundle", 40, 40, 434, 394),
     ("gliding_assay", "assay", 60, 60, 12 * 9, 12 * 8),
+    ("contractile_ring", "ring", 60, 60, 80 * 11, 80 * 10),
     ("mixed_motors", "motors", 60, 60, 24 * 5, 24 * 4),
     ("sliding_microtubules", "sliding", 60, 60, 12 * 9, 12 * 8),
     ("aster", "aster", 40, 40, 60 * 5, 60 * 4),
