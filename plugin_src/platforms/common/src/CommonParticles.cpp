@@ -11,6 +11,7 @@
 #include <limits>
 #include <map>
 #include <mutex>
+#include <utility>
 
 using namespace OpenMM;
 using namespace cylchain;
@@ -18,7 +19,7 @@ using namespace std;
 
 namespace OpenMM {
 namespace layout {
-#include "../kernels/layout.cc"
+#include "../kernels/layout.cc" // NOLINT(bugprone-suspicious-include)
 } // namespace layout
 } // namespace OpenMM
 
@@ -367,7 +368,7 @@ void CommonParticles::displaceOthers(const OtherParticles& present, const StepSe
     copy(settings.flow.gradient, settings.flow.gradient+9, ofFlow.begin()+layout::FLOW_GRADIENT);
     copy(settings.flow.origin, settings.flow.origin+3, ofFlow.begin()+layout::FLOW_ORIGIN);
     if (ofFlow != flowNumbers) {
-        flowNumbers = ofFlow;
+        flowNumbers = std::move(ofFlow);
         flow.upload(flowNumbers);
     }
     displaceParticles->setArg(0, (int) others.size());
