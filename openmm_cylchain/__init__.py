@@ -48,6 +48,7 @@ from .filaments.presets import ACTIN_AGING, ACTIN_ATP, DSDNA, F_ACTIN, MDIA1_END
 from .filaments.segment_place import SegmentPlace
 from .filaments.severing import Severing
 from .filaments.shapes import FilamentOptions
+from .kinetics.barrier import Barrier
 from .kinetics.binding_range import BindingRange
 from .kinetics.branching import Branching
 from .kinetics.crosslinker import Crosslinker
@@ -86,6 +87,7 @@ __all__ = [
     "ALPHA_ACTININ",
     "Attachment",
     "BeadSpringType",
+    "Barrier",
     "BindingRange",
     "Box",
     "BoxWarning",

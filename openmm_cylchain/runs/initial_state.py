@@ -222,6 +222,8 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
                 planar=own.planar,
                 region=own.region,
             )
+    for barrier in configuration.barriers if kinetics else ():
+        filaments.add_barrier(**vars(barrier))
     add_holding_linkers(configuration, filaments, seed)
     return filaments
 
