@@ -57,7 +57,7 @@ from .kinetics.hand import Hand
 from .kinetics.hand_at_end import HandAtEnd
 from .kinetics.linker_table import LinkerTable
 from .kinetics.nucleation import Nucleation
-from .kinetics.presets import ALPHA_ACTININ, DYNEIN, FILAMIN, KINESIN_1, MYOSIN_II
+from .kinetics.presets import ALPHA_ACTININ, COHESIN, CONDENSIN, DYNEIN, FILAMIN, KINESIN_1, MYOSIN_II
 from .mechanics.flow import Flow
 from .mechanics.friction import EndCorrections, SegmentFriction, stokes_friction
 from .output.growth_reporter import GrowthReporter
@@ -91,6 +91,8 @@ __all__ = [
     "BindingRange",
     "Box",
     "BoxWarning",
+    "COHESIN",
+    "CONDENSIN",
     "ConstantVelocityPulling",
     "ContactForceReporter",
     "ContactForces",

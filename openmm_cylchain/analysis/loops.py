@@ -64,9 +64,8 @@ def contact_probability(
     per_decade = whole_number(bins_per_decade, 1, "bins_per_decade")
     length = _segment_length(run)
     longest = max(len(each.nodes) // 2 if each.ring else len(each.nodes) - 1 for each in run.filaments)
-    decades = np.log10(longest)
+    decades = np.log10(longest + 1)
     edges = np.unique(np.round(np.logspace(0.0, decades, int(np.ceil(per_decade * decades)) + 1))).astype(int)
-    edges = np.append(edges[: max(1, len(edges) - 1)], longest + 1)
     possible = np.zeros(longest + 1)
     for each in run.filaments:
         possible += _pairs_by_separation(len(each.nodes), each.ring, longest)

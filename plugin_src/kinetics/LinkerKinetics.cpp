@@ -50,6 +50,9 @@ LinkerKinetics::LinkerKinetics(const LinkerSystem& ofSystem, const ChainList& ch
     for (const LinkerType& type : system.types) {
         anyConcentration = anyConcentration || type.concentration >= 0;
         anyAnchors = anyAnchors || type.hands[0] < 0;
+        // Of pairs, none looks for places around the other hand.
+        if (type.loadsPairs() && !type.diffuses())
+            continue;
         for (int hand : type.hands)
             anyBinding = anyBinding || (hand >= 0 && system.hands[hand].bindingRate > 0);
     }

@@ -169,6 +169,9 @@ void LinkerKinetics::walkPart(Linker& linker, const KineticStep& step, double du
             if (isCaptured(system.hands[type.hands[side]], linker.hands[side], moves[side], random))
                 continue;
             linker.hands[side].position += moves[side];
+            // One that has passed a barrier may be at its very place.
+            if (heldBy(system.hands[type.hands[side]], linker.hands[side]) != nullptr)
+                letGo(system.hands[type.hands[side]], linker.hands[side]);
             stayOnChain(linker, side, count);
         }
 }
