@@ -23,11 +23,11 @@ from openmm_cylchain import Crosslinker, Filaments, FilamentType, Hand
 
 SEGMENTS, SEGMENT_LENGTH = 120, 50.0  # nm
 BARRIERS = (2000.0, 4000.0)  # nm, along the chain
-EXTRUDERS = 6
+EXTRUDERS = 4
 SPEED, STALL_FORCE = 300.0, 1.0  # nm/s of each hand, pN
-LIFETIME = 4.0  # s
+LIFETIME = 6.0  # s
 SITE = 25.0  # nm
-STEP = 50 * unit.microsecond
+STEP = 100 * unit.microsecond
 STEPS = 400000
 FRAMES = 400
 VISCOSITY = 0.1 * unit.pascal * unit.second
@@ -57,7 +57,6 @@ hands = [
         speed=direction * SPEED * nanometer / second,
         stall_force=STALL_FORCE * unit.piconewton,
         site_spacing=SITE * nanometer,
-        at_end="hold",
     )
     for direction in (-1, 1)
 ]
