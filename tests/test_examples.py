@@ -27,6 +27,7 @@ CASES = [
     ("contractile_bundle", "bundle", 40, 40, 434, 394),
     ("gliding_assay", "assay", 60, 60, 12 * 9, 12 * 8),
     ("sliding_microtubules", "sliding", 60, 60, 12 * 9, 12 * 8),
+    ("loop_extrusion", "loops", 60, 60, 121, 120),
     ("aster", "aster", 40, 40, 60 * 5, 60 * 4),
     ("rearranging_network", "network", 200, 20, 140 * 11, 140 * 10),
     ("crosslinked_bundle", "bundle", 40, 40, 6 * 31, 6 * 30),

@@ -229,6 +229,8 @@ def warn_if_springs_do_not_fit(kind: Crosslinker, temperature: Scalar) -> None:
     bind only very near to the other end: its length in equilibrium has the standard deviation (k_BT/k)^(1/2) along each
     axis, and binding at the distance d from the other end is slower by exp(-k d^2/(2 k_BT)).
     """
+    if kind.loading_distance is not None:
+        return
     if kind.rest_length > 0.0:
         _warn_if_reach_is_short(kind, temperature)
         return
