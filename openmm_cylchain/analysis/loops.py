@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy
@@ -175,7 +176,7 @@ def _pairs_by_separation(nodes: int, ring: bool, longest: int) -> FloatArray:
     return nodes * halves * (separations > 0) * (2 * separations <= nodes)
 
 
-def _contacts(run: Run, frames: range, cutoff: float, among_filaments: bool = False) -> Iterator[tuple]:
+def _contacts(run: Run, frames: range, cutoff: float, among_filaments: bool = False) -> Iterator[tuple[Any, Any, Any]]:
     # Of each frame, pairs of nodes: their numbers along one filament, and this; or a filament and a number of each.
     counts = np.array([len(own.nodes) for own in run.filaments])
     filament: IntArray = np.repeat(np.arange(len(counts)), counts)

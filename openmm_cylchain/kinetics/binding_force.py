@@ -95,8 +95,8 @@ def make_binding_force(
             _add_anchor(force, anchor)
     _add_branch_joints(force, filaments, len(linkers))
     for barrier in barriers:
-        own = barrier.filament, barrier.arc_length, barrier.direction
-        force.addBarrier(*own, barrier.capture_probability, barrier.release_rate)
+        place = barrier.filament, barrier.arc_length, barrier.direction
+        force.addBarrier(*place, barrier.capture_probability, barrier.release_rate)
     place_linkers(force, linkers, filaments, temperature, positions, box)
     return force
 

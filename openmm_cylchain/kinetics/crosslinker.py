@@ -103,21 +103,21 @@ class Crosslinker:
         true_or_false(self.reversible, f"{label} reversible")
         object.__setattr__(self, "cosine_range", _as_cosines(self.cosine_range, f"{label} cosine_range"))
         if self.loading_distance is not None:
-            distance = positive(self.loading_distance, LENGTH, f"{label} loading_distance")
-            object.__setattr__(self, "loading_distance", distance)
-            self._check_loading(label)
+            object.__setattr__(self, "loading_distance", self._checked_loading(label))
 
-    def _check_loading(self, label):
+    def _checked_loading(self, label):
+        distance = positive(self.loading_distance, LENGTH, f"{label} loading_distance")
         if self.has_rules:
             raise InputError(f"{label} give loading_distance, or cosine_range or trans_activated, not both.")
         spacing = self.hands[1].site_spacing
-        if spacing is not None and self.loading_distance < spacing:
+        if spacing is not None and distance < spacing:
             raise InputError(
                 f"{label} loading_distance must be at least the site_spacing of the second hand, {spacing:g} nm: a "
                 "site holds one hand."
             )
         if any(hand.filament_end is not None and hand.filament_end.binds_there for hand in self.hands):
             raise InputError(f"{label} hands that bind at ends have no loading_distance.")
+        return distance
 
     @property
     def has_rules(self) -> bool:

@@ -7,8 +7,9 @@ preset with other values is made by ``dataclasses.replace``.
 
 Papers
 ------
-Coppin, Pierce, Hsu, Vale, PNAS 1997, 94, 8539. Davidson et al., Science 2019, 366, 1338. Ferrer, Lee, Chen, Pelz, Nakamura, Kamm, Lang, PNAS 2008, 105, 9221.
-Ganji et al., Science 2018, 360, 102. Hansen et al., eLife 2017, 6, e25776. Kerssemakers, Howard, Hess, Diez, PNAS 2006, 103, 15812. Klumpp, Lipowsky, PNAS 2005, 102, 17284. Kuhlman, Ellis,
+Coppin, Pierce, Hsu, Vale, PNAS 1997, 94, 8539. Davidson et al., Science 2019, 366, 1338. Ferrer, Lee, Chen, Pelz,
+Nakamura, Kamm, Lang, PNAS 2008, 105, 9221. Ganji et al., Science 2018, 360, 102. Hansen et al., eLife 2017, 6, e25776.
+Kerssemakers, Howard, Hess, Diez, PNAS 2006, 103, 15812. Klumpp, Lipowsky, PNAS 2005, 102, 17284. Kuhlman, Ellis,
 Critchley, Bagshaw, FEBS Lett. 1994, 339, 297. Leduc et al., PNAS 2004, 101, 17096. Mallik, Carter, Lex, King, Gross,
 Nature 2004, 427, 649. Müller, Klumpp, Lipowsky, PNAS 2008, 105, 4609. Nakamura, Osborn, Hartemink, Hartwig, Stossel, J.
 Cell Biol. 2007, 179, 1011. Popov, Komianos, Papoian, PLoS Comput. Biol. 2016, 12, e1004877 (MEDYAN). Schnitzer,

@@ -70,7 +70,7 @@ def test_pairs_and_barriers_in_a_context_that_starts_again():
         _, system, positions = filaments.build()
         copy = openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(system))
 
-        def context_of(own):
+        def context_of(own, filaments=filaments):
             integrator = filaments.create_integrator(own, 1e8, random_seed=3, checks=False)
             return openmm.Context(own, integrator, openmm.Platform.getPlatformByName("Reference"))
 
@@ -84,7 +84,9 @@ def test_pairs_and_barriers_in_a_context_that_starts_again():
         assert np.all(table.filaments[both, 0] == table.filaments[both, 1])
         assert np.all(np.diff(table.arc_lengths[both], axis=1) > 0)
         on = table.filaments == 1
-        held = table.arc_lengths[on] % 25 == 0.625 * 25 if spacing else np.isin(table.arc_lengths[on], [800, 1500, 2200])
+        held = (
+            table.arc_lengths[on] % 25 == 0.625 * 25 if spacing else np.isin(table.arc_lengths[on], [800, 1500, 2200])
+        )
         assert held.any()
         checkpoint = context.createCheckpoint()
         state = context.getState(positions=True, parameters=True, integratorParameters=True)
