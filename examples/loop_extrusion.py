@@ -1,7 +1,7 @@
 """Loop extruders on a chain of chromatin, with a domain between two barriers as CTCF makes it.
 
-Extruders load anywhere on a chain as pairs of hands that walk apart, one hand to each end, and reel a loop in until they
-let go. They stop each other, since a site holds one hand. Two barriers capture the hands that come to them from
+Extruders load anywhere on a chain as pairs of hands that walk apart, one hand to each end, and reel a loop in until
+they let go. They stop each other, since a site holds one hand. Two barriers capture the hands that come to them from
 between, so that many loops join both. Hands walk some ten times as fast as cohesin does, to see more in less time.
 
     python loop_extrusion.py [folder] [steps]

@@ -26,8 +26,9 @@ from .hand import Hand
 class Crosslinker:
     """A linker: a spring with the energy (k/2) (d - d0)^2 of its length d, and a hand at each end.
 
-    With hands that walk it is a motor, or, with a ``loading_distance``, an extruder of loops. Arguments are keywords and take ``openmm.unit`` quantities or plain numbers in
-    OpenMM's units; the attributes hold plain numbers in OpenMM's units (nm, kJ/mol).
+    With hands that walk it is a motor, or, with a ``loading_distance``, an extruder of loops. Arguments are keywords
+    and take ``openmm.unit`` quantities or plain numbers in OpenMM's units; the attributes hold plain numbers in
+    OpenMM's units (nm, kJ/mol).
 
     Parameters
     ----------
