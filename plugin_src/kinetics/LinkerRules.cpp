@@ -30,7 +30,7 @@ bool LinkerKinetics::isInRange(const Hand& hand, const HandPlace& place) const {
     return isNear != own.excluded;
 }
 
-/** Find where the second hand of a linker binds that loads as a pair; false if there is no place, or none that is free. */
+/** Find where the second hand of a linker binds that loads as a pair; false if there is no free place. */
 bool LinkerKinetics::findPartner(const LinkerType& type, const HandPlace& first, const Sites* sites,
         HandPlace& found) const {
     const int number = type.hands[1];

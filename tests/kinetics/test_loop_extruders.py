@@ -66,7 +66,7 @@ def test_pairs_and_barriers_in_a_context_that_starts_again():
         filaments = chains(2)
         filaments.add_linkers(extruder(spacing=spacing), 30, volume=1e9)
         for place in (800.0, 1500.0, 2200.0):
-            filaments.add_barrier(1, place, toward="both", release_rate=0.5 / SECOND, capture_probability=0.7)
+            filaments.add_barrier(1, place, toward="both", release_rate=0.1 / SECOND, capture_probability=0.7)
         _, system, positions = filaments.build()
         copy = openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(system))
 
@@ -77,7 +77,7 @@ def test_pairs_and_barriers_in_a_context_that_starts_again():
         context = context_of(system)
         context.setPositions(positions)
         here = filaments.in_context(context)
-        context.getIntegrator().step(4000)
+        context.getIntegrator().step(6000)
         table = here.linkers()
         both = table.held == 2
         assert 5 < both.sum() < 30 and not np.any(table.held == 1)
