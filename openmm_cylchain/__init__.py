@@ -48,6 +48,7 @@ from .filaments.presets import ACTIN_AGING, ACTIN_ATP, DSDNA, F_ACTIN, MDIA1_END
 from .filaments.segment_place import SegmentPlace
 from .filaments.severing import Severing
 from .filaments.shapes import FilamentOptions
+from .kinetics.barrier import Barrier
 from .kinetics.binding_range import BindingRange
 from .kinetics.branching import Branching
 from .kinetics.crosslinker import Crosslinker
@@ -56,7 +57,7 @@ from .kinetics.hand import Hand
 from .kinetics.hand_at_end import HandAtEnd
 from .kinetics.linker_table import LinkerTable
 from .kinetics.nucleation import Nucleation
-from .kinetics.presets import ALPHA_ACTININ, DYNEIN, FILAMIN, KINESIN_1, MYOSIN_II
+from .kinetics.presets import ALPHA_ACTININ, COHESIN, CONDENSIN, DYNEIN, FILAMIN, KINESIN_1, MYOSIN_II
 from .mechanics.flow import Flow
 from .mechanics.friction import EndCorrections, SegmentFriction, stokes_friction
 from .output.growth_reporter import GrowthReporter
@@ -86,9 +87,12 @@ __all__ = [
     "ALPHA_ACTININ",
     "Attachment",
     "BeadSpringType",
+    "Barrier",
     "BindingRange",
     "Box",
     "BoxWarning",
+    "COHESIN",
+    "CONDENSIN",
     "ConstantVelocityPulling",
     "ContactForceReporter",
     "ContactForces",

@@ -29,6 +29,7 @@ CASES = [
     ("contractile_ring", "ring", 60, 60, 80 * 11, 80 * 10),
     ("mixed_motors", "motors", 60, 60, 24 * 5, 24 * 4),
     ("sliding_microtubules", "sliding", 60, 60, 12 * 9, 12 * 8),
+    ("loop_extrusion", "loops", 60, 60, 121, 120),
     ("aster", "aster", 40, 40, 60 * 5, 60 * 4),
     ("rearranging_network", "network", 200, 20, 140 * 11, 140 * 10),
     ("crosslinked_bundle", "bundle", 40, 40, 6 * 31, 6 * 30),

@@ -26,6 +26,7 @@ from .filament_shapes import (
     segment_lengths,
     tangents,
 )
+from .loops import ContactProbability, contact_counts, contact_probability, loop_lengths
 from .moduli import RelaxationModulus, relaxation_modulus
 from .networks import contact_map, contraction, filament_distances, find_bundles, mesh_size
 from .order import director, order_parameter, order_tensor
@@ -36,6 +37,7 @@ from .stress import Stress, stress
 
 __all__ = [
     "ContactFrame",
+    "ContactProbability",
     "CrosslinkFrame",
     "CrossingCounter",
     "Crossings",
@@ -50,7 +52,9 @@ __all__ = [
     "bending_drift",
     "bending_mode_amplitudes",
     "centers_of_mass",
+    "contact_counts",
     "contact_map",
+    "contact_probability",
     "contour_lengths",
     "contraction",
     "count_nodes",
@@ -63,6 +67,7 @@ __all__ = [
     "find_crossings",
     "joint_cosines",
     "load",
+    "loop_lengths",
     "mean_square_displacement",
     "mesh_size",
     "node_positions",

@@ -119,7 +119,8 @@ class CompiledEngine(Engine):
             system.addForce(make_growth_force(placed.filaments, placed.viscosity, placed.temperature, box))
         if placed.linkers:
             linkers, filaments = placed.linkers, placed.filaments
-            system.addForce(make_binding_force(linkers, filaments, placed.temperature, placed.positions, box))
+            settings = placed.temperature, placed.positions, box, placed.barriers
+            system.addForce(make_binding_force(linkers, filaments, *settings))
 
     def create_integrator(self, system, placed, settings):
         """Create a NativeIntegrator."""

@@ -9,6 +9,7 @@ import openmm
 
 from ..filaments.body import PlacedBody
 from ..filaments.filament import Filament, Tether
+from ..kinetics.barrier import Barrier
 from ..kinetics.linkers import Linkers
 from ..mechanics.flow import Flow
 
@@ -39,6 +40,8 @@ class PlacedFilaments:
         Particles of each body.
     positions : (particles, 3) array
         In nm, of the System, while forces are added; empty later.
+    barriers : tuple of Barrier
+        On filaments, for hands of linkers.
     """
 
     filaments: tuple[Filament, ...]
@@ -52,6 +55,7 @@ class PlacedFilaments:
     bodies: tuple[PlacedBody, ...] = ()
     body_indices: tuple[np.ndarray, ...] = ()
     positions: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    barriers: tuple[Barrier, ...] = ()
 
     @property
     def nodes(self) -> np.ndarray:

@@ -14,6 +14,7 @@ from ..filaments.filament import Filament
 from ..mechanics.geometry import to_nearest_images
 from ..units.quantities import require_kind, thermal_energy
 from ..units.types import FloatArray, IntArray
+from .barrier import Barrier
 from .binding_range import ENDS_OF_RANGE
 from .first_places import FirstPlaces, contour_of
 from .growth_force import branchings_of
@@ -44,6 +45,7 @@ def make_binding_force(
     temperature: float,
     positions: FloatArray,
     box: FloatArray | None,
+    barriers: Sequence[Barrier] = (),
 ) -> openmm.Force:
     """The force of linkers that bind to the filaments of a System.
 
@@ -57,6 +59,8 @@ def make_binding_force(
         In nm, of the System: some particles may be anchors.
     box : (3, 3) array or None
         Periodic box vectors if distances are those of nearest images.
+    barriers : sequence of Barrier
+        What captures hands that walk.
 
     Raises
     ------
@@ -73,11 +77,13 @@ def make_binding_force(
             if hand not in hands:
                 hands[hand] = _add_hand(force, hand, filaments, own.kind.name)
             numbers.append(hands[hand])
+        loading = own.kind.loading_distance or 0.0
         first = -1 if own.anchors is not None else numbers[0]
         number = force.addLinkerType(
-            first, numbers[1], own.kind.rest_length, own.kind.stiffness, own.kind.same_filament
+            first, numbers[1], own.kind.rest_length, own.kind.stiffness, own.kind.same_filament or loading > 0.0
         )
         force.setLinkerTypeRules(number, *own.kind.cosine_range, own.kind.trans_activated, own.kind.reversible)
+        force.setLinkerTypeLoading(number, loading)
         density = -1.0 if own.concentration is None else own.concentration
         force.setLinkerTypeReservoir(number, own.volume or 0.0, density)
         if own.diffusion is not None:
@@ -88,6 +94,9 @@ def make_binding_force(
         for anchor in () if own.anchors is None else own.anchors:
             _add_anchor(force, anchor)
     _add_branch_joints(force, filaments, len(linkers))
+    for barrier in barriers:
+        place = barrier.filament, barrier.arc_length, barrier.direction
+        force.addBarrier(*place, barrier.capture_probability, barrier.release_rate)
     place_linkers(force, linkers, filaments, temperature, positions, box)
     return force
 

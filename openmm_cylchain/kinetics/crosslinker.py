@@ -26,8 +26,9 @@ from .hand import Hand
 class Crosslinker:
     """A linker: a spring with the energy (k/2) (d - d0)^2 of its length d, and a hand at each end.
 
-    With hands that walk it is a motor. Arguments are keywords and take ``openmm.unit`` quantities or plain numbers in
-    OpenMM's units; the attributes hold plain numbers in OpenMM's units (nm, kJ/mol).
+    With hands that walk it is a motor, or, with a ``loading_distance``, an extruder of loops. Arguments are keywords
+    and take ``openmm.unit`` quantities or plain numbers in OpenMM's units; the attributes hold plain numbers in
+    OpenMM's units (nm, kJ/mol).
 
     Parameters
     ----------
@@ -48,6 +49,10 @@ class Crosslinker:
         Whether hands unbind only where and when they could bind by ``cosine_range`` and ``trans_activated``: what is
         bound stays where filaments turn out of the range, and the first hand stays as long as the second one is bound.
         Without it they always unbind, which breaks detailed balance.
+    loading_distance : length, optional
+        Both hands bind in one event, to one filament: the first one, with its ``binding_rate``, and the second one so
+        far from it towards the plus end. They unbind in one event, with the sum of both rates, also where one of them
+        lets go at an end. A first hand that walks to the minus end and a second one to the plus end extrude a loop.
     name : str
         For tables and messages.
 
@@ -65,6 +70,7 @@ class Crosslinker:
     cosine_range: tuple[float, float] = (-1.0, 1.0)
     trans_activated: bool = False
     reversible: bool = True
+    loading_distance: float | None = None
 
     if TYPE_CHECKING:  # What may be given; the attributes hold plain numbers.
 
@@ -79,6 +85,7 @@ class Crosslinker:
             cosine_range: Sequence[float] = (-1.0, 1.0),
             trans_activated: bool = False,
             reversible: bool = True,
+            loading_distance: Scalar | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -96,6 +103,22 @@ class Crosslinker:
         true_or_false(self.trans_activated, f"{label} trans_activated")
         true_or_false(self.reversible, f"{label} reversible")
         object.__setattr__(self, "cosine_range", _as_cosines(self.cosine_range, f"{label} cosine_range"))
+        if self.loading_distance is not None:
+            object.__setattr__(self, "loading_distance", self._checked_loading(label))
+
+    def _checked_loading(self, label):
+        distance = positive(self.loading_distance, LENGTH, f"{label} loading_distance")
+        if self.has_rules:
+            raise InputError(f"{label} give loading_distance, or cosine_range or trans_activated, not both.")
+        spacing = self.hands[1].site_spacing
+        if spacing is not None and distance < spacing:
+            raise InputError(
+                f"{label} loading_distance must be at least the site_spacing of the second hand, {spacing:g} nm: a "
+                "site holds one hand."
+            )
+        if any(hand.filament_end is not None and hand.filament_end.binds_there for hand in self.hands):
+            raise InputError(f"{label} hands that bind at ends have no loading_distance.")
+        return distance
 
     @property
     def has_rules(self) -> bool:

@@ -142,6 +142,11 @@ def as_linkers(
             f"{label} a volume is that of a count of unbound linkers: those with "
             f"{'a concentration' if anchors is None else 'anchors'} need none."
         )
+    if kind.loading_distance is not None:
+        if bound:
+            raise InputError(f"{label} those with a loading_distance begin unbound: let them bind, or set_linkers.")
+        if anchors is not None:
+            raise InputError(f"{label} a linker with an anchor has one hand: loading_distance is of two.")
     if anchors is not None:
         if kind.hands[0] != kind.hands[1]:
             raise InputError(f"{label} a linker with an anchor has one hand, but this type has two that differ.")
@@ -170,6 +175,12 @@ def _as_shapes(region, label):
     if not isinstance(shapes, Sequence) or not shapes or not all(isinstance(own, Shape) for own in shapes):
         raise InputError(f"{label} region must be a Shape such as Sphere, or several, but is {shown(region)}.")
     return tuple(shapes)
+
+
+def refuse_barriers_without_linkers(linkers: Sequence[Linkers], barriers: Sequence[object]) -> None:
+    """Raise InputError for barriers that have nothing to capture."""
+    if barriers and not linkers:
+        raise InputError("There are barriers, but no linkers that they could capture: add some, or leave barriers out.")
 
 
 def refuse_linkers_without_volume(linkers: Sequence[Linkers], system: openmm.System) -> None:
@@ -218,6 +229,8 @@ def warn_if_springs_do_not_fit(kind: Crosslinker, temperature: Scalar) -> None:
     bind only very near to the other end: its length in equilibrium has the standard deviation (k_BT/k)^(1/2) along each
     axis, and binding at the distance d from the other end is slower by exp(-k d^2/(2 k_BT)).
     """
+    if kind.loading_distance is not None:
+        return
     if kind.rest_length > 0.0:
         _warn_if_reach_is_short(kind, temperature)
         return

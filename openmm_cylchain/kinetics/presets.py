@@ -7,7 +7,8 @@ preset with other values is made by ``dataclasses.replace``.
 
 Papers
 ------
-Coppin, Pierce, Hsu, Vale, PNAS 1997, 94, 8539. Ferrer, Lee, Chen, Pelz, Nakamura, Kamm, Lang, PNAS 2008, 105, 9221.
+Coppin, Pierce, Hsu, Vale, PNAS 1997, 94, 8539. Davidson et al., Science 2019, 366, 1338. Ferrer, Lee, Chen, Pelz,
+Nakamura, Kamm, Lang, PNAS 2008, 105, 9221. Ganji et al., Science 2018, 360, 102. Hansen et al., eLife 2017, 6, e25776.
 Kerssemakers, Howard, Hess, Diez, PNAS 2006, 103, 15812. Klumpp, Lipowsky, PNAS 2005, 102, 17284. Kuhlman, Ellis,
 Critchley, Bagshaw, FEBS Lett. 1994, 339, 297. Leduc et al., PNAS 2004, 101, 17096. Mallik, Carter, Lex, King, Gross,
 Nature 2004, 427, 649. Müller, Klumpp, Lipowsky, PNAS 2008, 105, 4609. Nakamura, Osborn, Hartemink, Hartwig, Stossel, J.
@@ -149,11 +150,64 @@ Without anchors it is a complex of two of them, as KINESIN_1.
 - ``binding_rate`` is chosen: 1.6/s for a straight filament at the rest length.
 """
 
+# One kilobase of DNA is 340 nm long.
+COHESIN = Crosslinker(
+    name="cohesin",
+    hands=[
+        Hand(
+            binding_rate=1 / _S,
+            reach=100 * _NM,
+            unbinding_rate=0.5 / (22 * 60 * _S),
+            speed=direction * 170 * _NM / _S,
+            stall_force=0.2 * _PN,
+        )
+        for direction in (-1, 1)
+    ],
+    stiffness=0.005 * _PN / _NM,
+    rest_length=40 * _NM,
+    loading_distance=40 * _NM,
+)
+"""Cohesin with NIPBL on DNA: both hands load at once, walk apart, and extrude a loop from both sides.
+
+- speed: 1 kb/s in all, half of it on each side. Single complexes extrude symmetrically, with up to 2.1 kb/s (Davidson
+  et al. 2019); the mean is 0.5 kb/s in Kim et al., Science 2019, 366, 1345. Lengths are those of naked DNA, 340 nm for
+  a kilobase: on filaments that stand for chromatin, take the length of a kilobase there.
+- unbinding: once in 22 min, the residence time of cohesin on chromatin (Hansen et al. 2017).
+- ``stall_force`` 0.2 pN is chosen: extrusion is sensitive to some tenths of a piconewton.
+- lengths are chosen, about the size of the molecule, and so is ``binding_rate``. The spring is so soft that its
+  thermal force, (k k_BT)^(1/2) = 0.14 pN, does not exceed the stall force.
+"""
+
+CONDENSIN = Crosslinker(
+    name="condensin",
+    hands=[
+        Hand(
+            binding_rate=1 / _S,
+            reach=100 * _NM,
+            unbinding_rate=0.001 / _S,
+            speed=speed * 204 * _NM / _S,
+            stall_force=0.4 * _PN if speed else None,
+        )
+        for speed in (0, 1)
+    ],
+    stiffness=0.005 * _PN / _NM,
+    rest_length=40 * _NM,
+    loading_distance=40 * _NM,
+)
+"""Yeast condensin on DNA: one hand holds, the other one walks to the plus end and reels DNA in from that side.
+
+- one-sided, with up to 1.5 kb/s, depending on the force (Ganji et al. 2018); speed 0.6 kb/s, its mean.
+- all others walk to the minus end: a second kind of linkers, with a first hand that walks and a second one that holds.
+- ``stall_force`` 0.4 pN, unbinding once in 500 s, stiffness, lengths and ``binding_rate`` are chosen, as for COHESIN.
+"""
+
 PRESETS = {
     "ALPHA_ACTININ": ALPHA_ACTININ,
     "FILAMIN": FILAMIN,
     "MYOSIN_II": MYOSIN_II,
     "KINESIN_1": KINESIN_1,
     "DYNEIN": DYNEIN,
+    "COHESIN": COHESIN,
+    "CONDENSIN": CONDENSIN,
 }
 """Crosslinkers by the names that users and configurations use."""

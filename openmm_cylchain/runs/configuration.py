@@ -19,6 +19,7 @@ from .keys import ConfigurationError, Place, Text
 from .stages import read_stages
 from .start_files import digest_of, find_start_file
 from .table import ACTIVE, UnknownKeyError
+from .tables.barriers import BARRIER, check_barriers, read_barrier
 from .tables.bodies import BODY, read_body, with_bodies
 from .tables.couplings import (
     CONTACTS,
@@ -58,6 +59,7 @@ TABLES = (
     PARTICLES,
     BODY,
     LINKERS,
+    BARRIER,
     LINK,
     JOINT,
     TETHER,
@@ -79,6 +81,7 @@ _OWNERS = (
     BRANCHING,
     LINKERS,
     HAND,
+    BARRIER,
     BOX,
     FLOW,
     PARTICLES,
@@ -117,6 +120,7 @@ class Configuration:
     pulls: tuple = ()
     links: tuple = ()
     joints: tuple = ()
+    barriers: tuple = ()
     bodies: tuple = ()
     monomers: tuple = dataclasses.field(default=(), compare=False)
     tables: dict = dataclasses.field(default_factory=dict, compare=False, repr=False)
@@ -223,6 +227,7 @@ def _configuration(raw, text, folder, lines):
     check_walls(tables["wall"], walls, groups, bodies, [own["name"] for own in tables["particles"]])
     groups = with_bodies(groups, bodies)
     linkers = tuple(read_linkers(own, groups, box, seed, walls, bodies) for own in tables["linkers"])
+    check_barriers(tables["barrier"], linkers)
     configuration = Configuration(
         title,
         solvent,
@@ -239,6 +244,7 @@ def _configuration(raw, text, folder, lines):
         tuple(read_pull(own, groups) for own in tables["pull"]),
         tuple(read_link(own, groups, bodies) for own in tables["link"]),
         tuple(read_joint(own, groups) for own in tables["joint"]),
+        tuple(barrier for own in tables["barrier"] for barrier in read_barrier(own, groups)),
         bodies,
         monomers,
         tables,

@@ -71,6 +71,8 @@ def _what_is_built(configuration, built):
     for label, own in zip(linker_labels(configuration), configuration.linkers):
         count = len(own.anchors) if own.anchors is not None else own.count
         yield f"    {'linkers at a concentration' if count is None else _counted(count, 'linker')}: {label}"
+    if configuration.barriers:
+        yield f"    {_counted(len(configuration.barriers), 'barrier')}"
     if built.links:
         yield f"    {_counted(built.links, 'link')}"
     if configuration.joints:

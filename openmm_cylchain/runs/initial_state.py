@@ -223,6 +223,8 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
                 region=own.region,
                 places=own.bound_at,
             )
+    for barrier in configuration.barriers if kinetics else ():
+        filaments.add_barrier(**vars(barrier))
     add_holding_linkers(configuration, filaments, seed)
     return filaments
 

@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..filaments.attachments import add_virtual_site, attachment_positions, neighbors
 from ..filaments.beam_refusals import refuse_beams
 from ..filaments.growth_refusals import refuse_growth
-from ..kinetics.linkers import refuse_linkers_without_volume
+from ..kinetics.linkers import refuse_barriers_without_linkers, refuse_linkers_without_volume
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.redistribution import ChainSet
 from ..time_steps.bead_spring_step import refuse_modes
@@ -185,6 +185,7 @@ class Filaments(TiedFilaments):
         add_noninteracting_entries(system, count, positions, self._coinciding())
         self._periodic = is_periodic(system)
         placed = replace(self._placed(), positions=positions)
+        refuse_barriers_without_linkers(self.linkers, self.barriers)
         self._engine.add_forces(system, placed, stretching_force_group, bending_force_group)
         return positions * unit.nanometer
 

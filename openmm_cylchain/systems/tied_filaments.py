@@ -16,6 +16,7 @@ from ..filaments.filament import Tether
 from ..filaments.growth_refusals import growth_refusal
 from ..filaments.placement import named_nodes
 from ..filaments.segment_place import SegmentPlace
+from ..kinetics.barrier import Barrier, as_barrier
 from ..kinetics.crosslinker import Crosslinker
 from ..kinetics.first_places import contour_of
 from ..kinetics.growth_force import branchings_of
@@ -33,6 +34,7 @@ class TiedFilaments(AddedFilaments):
         self._tethers: list[Tether] = []
         self._tethered_nodes: set[tuple[int, int]] = set()
         self._linkers: list[Linkers] = []
+        self._barriers: list[Barrier] = []
         # For so many filaments: the linkers of the joints of their branches.
         self._joints: tuple[int, list[Linkers]] = (0, [])
         # By Context: what has moved there, by number.
@@ -295,6 +297,59 @@ class TiedFilaments(AddedFilaments):
         warn_if_springs_do_not_fit(kind, self.temperature)
         return len(self._linkers) - 1
 
+    def add_barrier(
+        self,
+        filament: int,
+        arc_length: Scalar,
+        *,
+        toward: str,
+        release_rate: Scalar,
+        capture_probability: float = 1.0,
+    ) -> int:
+        """Add a barrier: a place on a filament that captures hands which walk past it, as CTCF captures cohesin.
+
+        A hand that it has captured stays there, bound, until the barrier lets it go on. It feels the force of its
+        spring, and unbinds with the rate that it has elsewhere. Hands that bind beside it, or are pulled past it
+        backward, are not captured. On sites, the one that has the barrier holds the hand.
+
+        Parameters
+        ----------
+        filament : int
+            The filament's number.
+        arc_length : length
+            From the first node, with segments at rest.
+        toward : {"plus", "minus", "both"}
+            It captures hands that walk towards this end. CTCF captures those that come to it from the side to which its
+            motif points: a motif that points to the plus end has ``toward="minus"``.
+        release_rate : 1/time
+            At which it lets a hand go on; 0 if it never does.
+        capture_probability : float
+            How likely it captures a hand that comes by.
+
+        Returns
+        -------
+        int
+            The barrier's number.
+
+        Raises
+        ------
+        InputError
+            For a filament or place that does not exist, a filament that grows, or a value that is missing or wrong.
+        """
+        label = f"Barrier {len(self._barriers)}"
+        self._refuse_if_built(label)
+        if not self._engine.has_linkers:
+            raise InputError(f"{label}: the {self._engine_name} engine has no linkers; use the compiled one.")
+        filament = self._lasting_filament(filament, label, "a barrier")
+        length = float(contour_of(self[filament])[-1])
+        self._barriers.append(as_barrier(filament, arc_length, toward, release_rate, capture_probability, length))
+        return len(self._barriers) - 1
+
+    @property
+    def barriers(self) -> tuple[Barrier, ...]:
+        """Tuple of the barriers, in the order of their numbers."""
+        return tuple(self._barriers)
+
     @property
     def linkers(self) -> tuple[Linkers, ...]:
         """Tuple of the types of linkers, in the order of their numbers, as they were added, and behind them those of
@@ -353,4 +408,5 @@ class TiedFilaments(AddedFilaments):
             tuple(self._control_points),
             tuple(self._bodies),
             tuple(self.body_indices),
+            barriers=tuple(self._barriers),
         )

@@ -11,7 +11,8 @@ using namespace std;
 namespace {
 
 /** Levels of noise: the events of linkers are at level 0. */
-const uint32_t LEVEL_OF_DIFFUSION = 30, LEVEL_OF_RELEASE = 29, LEVEL_OF_ENDS = 28, LEVEL_OF_SLIDING = 27;
+const uint32_t LEVEL_OF_DIFFUSION = 30, LEVEL_OF_RELEASE = 29, LEVEL_OF_ENDS = 28, LEVEL_OF_SLIDING = 27,
+        LEVEL_OF_BARRIERS = 26;
 /** Near a wall, of where a linker is put whose hand had to let go. */
 const int MOST_TRIES = 100;
 /** Of a word of 32 bits. */
@@ -133,8 +134,10 @@ void LinkerKinetics::walkOne(LinkerState& state, size_t index, const KineticStep
         slide(linker, step, random, count);
         watches[index] = watch(linker);
     }
-    if (kinds[watches[index].kind].walks)
-        walkAll(linker, step, watches[index], count);
+    if (kinds[watches[index].kind].walks) {
+        RandomNumbers random({step.seed, LEVEL_OF_BARRIERS, state.steps}, step.force, linker.number);
+        walkAll(linker, step, watches[index], random, count);
+    }
     if (system.isFree(linker)) {
         RandomNumbers random({step.seed, LEVEL_OF_RELEASE, state.steps}, step.force, linker.number);
         release(state, index, side, before, contours, step, random);

@@ -43,7 +43,10 @@ void LinkerKinetics::findKinds(const KineticStep& step) {
                 kind.slides = kind.slides || hand.slidingFriction > 0;
                 kind.walks = kind.walks || kind.slides || (hand.speed != 0 && !hops);
                 kind.velocity = hops ? 0 : hand.speed;
-                known = known && (held != 3 || !(hand.isLoaded() || hops || (type.hasAngles() && type.reversible)));
+                // A barrier may hold it.
+                const bool mayBeHeld = hand.speed != 0 && !system.barriers.empty();
+                known = known && !mayBeHeld &&
+                        (held != 3 || !(hand.isLoaded() || hops || (type.hasAngles() && type.reversible)));
             }
             else if (held != 0)
                 kind.perPiece = type.mayBind(side, true) ? proposalRate(hand) : 0;

@@ -50,9 +50,15 @@ LinkerKinetics::LinkerKinetics(const LinkerSystem& ofSystem, const ChainList& ch
     for (const LinkerType& type : system.types) {
         anyConcentration = anyConcentration || type.concentration >= 0;
         anyAnchors = anyAnchors || type.hands[0] < 0;
+        // Of pairs, none looks for places around the other hand.
+        if (type.loadsPairs() && !type.diffuses())
+            continue;
         for (int hand : type.hands)
             anyBinding = anyBinding || (hand >= 0 && system.hands[hand].bindingRate > 0);
     }
+    sort(system.barriers.begin(), system.barriers.end(), [] (const Barrier& a, const Barrier& b) {
+        return a.chain != b.chain ? a.chain < b.chain : a.position < b.position;
+    });
     // A place that is proposed may go to the middle of its site, or to the end, on another segment.
     largestReach += largestShift;
     anyDiffuses = system.anyDiffuses();
@@ -119,7 +125,7 @@ bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& 
 
 /** What may happen to a linker. */
 struct LinkerKinetics::Event {
-    enum Kind {Capture, Unbind, Propose, Hop};
+    enum Kind {Capture, Unbind, Propose, Hop, LetGo};
     Kind kind;
     int side, direction;
     double rate;
@@ -144,7 +150,7 @@ bool LinkerKinetics::draw(LinkerState& state, const KineticStep& step, Pending& 
     const Linker& linker = state.linkers[next.index];
     double& clock = state.clocks[next.index];
     const LinkerType& type = system.types[linker.type];
-    Event possible[4];
+    Event possible[4] = {};
     int numPossible = 0;
     double total = 0;
     auto add = [&] (Event::Kind kind, int side, int direction, double rate) {
@@ -165,7 +171,10 @@ bool LinkerKinetics::draw(LinkerState& state, const KineticStep& step, Pending& 
         if (linker.hands[side].isBound()) {
             if (!pulls || (!type.mustStay(side) && !staysByAngle))
                 add(Event::Unbind, side, 0, unbindingRate(hand, spring.energy, fabs(spring.force)));
-            if (hand.siteSpacing > 0 && hand.speed != 0) {
+            const Barrier* const barrier = heldBy(hand, linker.hands[side]);
+            if (barrier != nullptr)
+                add(Event::LetGo, side, 0, barrier->releaseRate);
+            else if (hand.siteSpacing > 0 && hand.speed != 0) {
                 const int direction = hand.speed > 0 ? 1 : -1;
                 double stiffness;
                 const double along = pulls ? direction*pull(linker, side, spring, step, stiffness) : 0;
@@ -211,7 +220,8 @@ void LinkerKinetics::apply(LinkerState& state, const KineticStep& step, Pending&
     Linker& linker = state.linkers[next.index];
     const int side = next.event.side;
     double* const position = system.types[linker.type].diffuses() ? &state.positions[3*next.index] : nullptr;
-    const bool wasFree = system.isFree(linker), lastHand = position != nullptr && !linker.pulls();
+    const bool wasFree = system.isFree(linker), lastHand = position != nullptr &&
+            (!linker.pulls() || system.types[linker.type].loadsPairs());
     const HandPlace before = linker.hands[side];
     HandPlace place;
     switch (next.event.kind) {
@@ -220,9 +230,12 @@ void LinkerKinetics::apply(LinkerState& state, const KineticStep& step, Pending&
             unbind(linker, side, sites, count);
         break;
     case Event::Hop:
-        hop(linker, side, next.event.direction, sites, count);
+        hop(linker, side, next.event.direction, next.random, sites, count);
         if (system.isFree(linker))
             release(state, next.index, side, before, contours, step, next.random);
+        break;
+    case Event::LetGo:
+        letGo(system.hands[system.types[linker.type].hands[side]], linker.hands[side]);
         break;
     case Event::Capture:
         if (captureAnywhere(linker, side, next.random, sites, place))
@@ -339,10 +352,11 @@ bool LinkerKinetics::looksAtPiece(const Watch& watch) const {
 }
 
 /** Hands of a linker walk that do not bind to sites. */
-void LinkerKinetics::walkAll(Linker& linker, const KineticStep& step, Watch& own, Count& count) const {
+void LinkerKinetics::walkAll(Linker& linker, const KineticStep& step, Watch& own, RandomNumbers& random,
+        Count& count) const {
     const Kind& kind = kinds[own.kind];
-    if (kind.pulls)
-        walk(linker, step, count);
+    if (kind.pulls || !system.barriers.empty())
+        walk(linker, step, random, count);
     else {
         const int side = own.kind%4-1;
         HandPlace& place = linker.hands[side];

@@ -56,6 +56,11 @@ struct KineticStep {
  * step, and, where they are reversible, rates of unbinding by the same number. So one way stays as likely as the other:
  * equilibrium has all of the states that there are without a rule on angles, between which chains turn.
  *
+ * Linkers that load as pairs bind both hands in one event, and unbind both in one: with the sum of the rates of both.
+ *
+ * A hand that walks past a barrier may be captured. It is at the very place of the barrier then, or off the middle of
+ * its site, and is known by that: as long as it is there, it does not walk.
+ *
  * Hands slide as a part of a step of their own, after events: with the spring's energy U(s) at the length s along the
  * chain, and the friction f, by ds = -U' dt/f+(2 k_B T/f)^(1/2) dW. A move is proposed that is exact for the harmonic
  * energy with the slope at s and the stiffness of the spring, and accepted by Metropolis and Hastings: equilibrium is
@@ -173,12 +178,19 @@ private:
     void slideFreely(HandPlace& place, double move, bool isHeld) const;
     Slope slopeAt(const Linker& linker, int side, const KineticStep& step, double duration,
             bool isShort) const;
-    void walk(Linker& linker, const KineticStep& step, Count& count) const;
-    void walkPart(Linker& linker, const KineticStep& step, double duration, Count& count) const;
+    void walk(Linker& linker, const KineticStep& step, RandomNumbers& random, Count& count) const;
+    void walkPart(Linker& linker, const KineticStep& step, double duration, RandomNumbers& random, Count& count) const;
+    bool walksNow(const Linker& linker, int side) const;
+    bool findPartner(const LinkerType& type, const HandPlace& first, const Sites* sites, HandPlace& found) const;
+    const Barrier* heldBy(const Hand& hand, const HandPlace& place) const;
+    const Barrier* findBarrier(const Hand& hand, int chain, double from, double to, RandomNumbers& random) const;
+    bool isCaptured(const Hand& hand, HandPlace& place, double move, RandomNumbers& random) const;
+    bool isCapturedAtSite(const Hand& hand, HandPlace& place, RandomNumbers& random) const;
+    void letGo(const Hand& hand, HandPlace& place) const;
     bool draw(LinkerState& state, const KineticStep& step, Pending& next) const;
     void apply(LinkerState& state, const KineticStep& step, Pending& next, Sites* sites, Count& count) const;
     void stayOnChain(Linker& linker, int side, Count& count) const;
-    void walkAll(Linker& linker, const KineticStep& step, Watch& watch, Count& count) const;
+    void walkAll(Linker& linker, const KineticStep& step, Watch& watch, RandomNumbers& random, Count& count) const;
     void sumLengths();
     void findKinds(const KineticStep& step);
     void findMarks(const KineticStep& step);
@@ -216,7 +228,7 @@ private:
             const Sites* sites, HandPlace& found) const;
     bool captureAnywhere(const Linker& linker, int side, RandomNumbers& random, const Sites* sites,
             HandPlace& found) const;
-    void hop(Linker& linker, int side, int direction, Sites* sites, Count& count) const;
+    void hop(Linker& linker, int side, int direction, RandomNumbers& random, Sites* sites, Count& count) const;
     std::uint64_t siteOf(const Hand& hand, const HandPlace& place) const;
     bool hasSite(const Hand& hand, int chain, double site) const;
     bool toSite(const Hand& hand, HandPlace& place) const;

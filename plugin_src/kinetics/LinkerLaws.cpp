@@ -112,14 +112,14 @@ double LinkerKinetics::speedUnder(const Hand& hand, double pull) const {
  * Hands that are bound walk, those which bind to sites excepted, with the speed under the load at the start. Chains
  * follow in the rest of the step, so that a load stays: walking against a spring that grows would be slower than that.
  */
-void LinkerKinetics::walk(Linker& linker, const KineticStep& step, Count& count) const {
+void LinkerKinetics::walk(Linker& linker, const KineticStep& step, RandomNumbers& random, Count& count) const {
     const LinkerType& type = system.types[linker.type];
     double rate = 0;
     int walking = 0;
     for (int side = 0; side < 2; side++)
-        if (linker.hands[side].isBound()) {
+        if (walksNow(linker, side)) {
             const Hand& hand = system.hands[type.hands[side]];
-            if (hand.siteSpacing == 0 && hand.speed != 0 && hand.stallForce > 0) {
+            if (hand.stallForce > 0) {
                 rate = max(rate, type.stiffness*fabs(hand.speed)/hand.stallForce);
                 walking++;
             }
@@ -127,28 +127,31 @@ void LinkerKinetics::walk(Linker& linker, const KineticStep& step, Count& count)
     const double needed = linker.pulls() ? ceil(walking*rate*step.stepSize) : 1;
     const int parts = static_cast<int>(min(MOST_PARTS, max(1.0, needed)));
     for (int part = 0; part < parts; part++)
-        walkPart(linker, step, step.stepSize/parts, count);
+        walkPart(linker, step, step.stepSize/parts, random, count);
 }
 
-void LinkerKinetics::walkPart(Linker& linker, const KineticStep& step, double duration, Count& count) const {
+/** Whether a hand walks that is bound to no site, and held by no barrier. */
+bool LinkerKinetics::walksNow(const Linker& linker, int side) const {
+    if (!linker.hands[side].isBound())
+        return false;
+    const Hand& hand = system.hands[system.types[linker.type].hands[side]];
+    return hand.speed != 0 && hand.siteSpacing == 0 && heldBy(hand, linker.hands[side]) == nullptr;
+}
+
+void LinkerKinetics::walkPart(Linker& linker, const KineticStep& step, double duration, RandomNumbers& random,
+        Count& count) const {
     const LinkerType& type = system.types[linker.type];
     double moves[2] = {0, 0};
-    int walking = 0;
-    for (int side = 0; side < 2; side++)
-        if (linker.hands[side].isBound()) {
-            const Hand& hand = system.hands[type.hands[side]];
-            walking += hand.speed != 0 && hand.siteSpacing == 0;
-        }
+    const bool walks[] = {walksNow(linker, 0), walksNow(linker, 1)};
+    const int walking = walks[0]+walks[1];
     if (walking == 0)
         return;
     const bool pulls = linker.pulls();
     const Spring spring = pulls ? measure(linker, step) : Spring();
     for (int side = 0; side < 2; side++) {
-        if (!linker.hands[side].isBound())
+        if (!walks[side])
             continue;
         const Hand& hand = system.hands[type.hands[side]];
-        if (hand.speed == 0 || hand.siteSpacing > 0)
-            continue;
         const double direction = hand.speed > 0 ? 1 : -1;
         double stiffness = 0;
         const double along = pulls ? direction*pull(linker, side, spring, step, stiffness) : 0;
@@ -161,8 +164,14 @@ void LinkerKinetics::walkPart(Linker& linker, const KineticStep& step, double du
         moves[side] = direction*move;
     }
     for (int side = 0; side < 2; side++)
-        if (moves[side] != 0) {
+        // The first one may have taken the second one off.
+        if (moves[side] != 0 && linker.hands[side].isBound()) {
+            if (isCaptured(system.hands[type.hands[side]], linker.hands[side], moves[side], random))
+                continue;
             linker.hands[side].position += moves[side];
+            // One that has passed a barrier may be at its very place.
+            if (heldBy(system.hands[type.hands[side]], linker.hands[side]) != nullptr)
+                letGo(system.hands[type.hands[side]], linker.hands[side]);
             stayOnChain(linker, side, count);
         }
 }
@@ -220,19 +229,32 @@ bool LinkerKinetics::toEnd(const Hand& hand, HandPlace& place) const {
 }
 
 void LinkerKinetics::bind(Linker& linker, int side, const HandPlace& place, Sites* sites, Count& count) const {
-    const Hand& hand = system.hands[system.types[linker.type].hands[side]];
-    linker.hands[side] = place;
-    if (hand.siteSpacing > 0 && sites != nullptr)
-        sites->insert(siteOf(hand, place));
-    count.events[linker.type].bindings++;
+    const LinkerType& type = system.types[linker.type];
+    HandPlace places[] = {place, place};
+    if (type.loadsPairs() && !findPartner(type, place, sites, places[1]))
+        return;
+    for (int own = 0; own < 2; own++) {
+        if (own != side && !type.loadsPairs())
+            continue;
+        const Hand& hand = system.hands[type.hands[own]];
+        linker.hands[own] = places[own];
+        if (hand.siteSpacing > 0 && sites != nullptr)
+            sites->insert(siteOf(hand, places[own]));
+        count.events[linker.type].bindings++;
+    }
 }
 
 void LinkerKinetics::unbind(Linker& linker, int side, Sites* sites, Count& count) const {
-    const Hand& hand = system.hands[system.types[linker.type].hands[side]];
-    if (hand.siteSpacing > 0 && sites != nullptr)
-        sites->erase(siteOf(hand, linker.hands[side]));
-    linker.hands[side] = HandPlace();
-    count.events[linker.type].unbindings++;
+    const LinkerType& type = system.types[linker.type];
+    for (int own = 0; own < 2; own++) {
+        if (!linker.hands[own].isBound() || (own != side && !type.loadsPairs()))
+            continue;
+        const Hand& hand = system.hands[type.hands[own]];
+        if (hand.siteSpacing > 0 && sites != nullptr)
+            sites->erase(siteOf(hand, linker.hands[own]));
+        linker.hands[own] = HandPlace();
+        count.events[linker.type].unbindings++;
+    }
 }
 
 /** The rate of proposals for each piece around. */
@@ -323,7 +345,8 @@ bool LinkerKinetics::captureAnywhere(const Linker& linker, int side, RandomNumbe
 }
 
 /** A hand on a site walks to the next one, if that is not taken. */
-void LinkerKinetics::hop(Linker& linker, int side, int direction, Sites* sites, Count& count) const {
+void LinkerKinetics::hop(Linker& linker, int side, int direction, RandomNumbers& random, Sites* sites,
+        Count& count) const {
     const Hand& hand = system.hands[system.types[linker.type].hands[side]];
     HandPlace next = linker.hands[side];
     double site = floor(next.position/hand.siteSpacing)+direction;
@@ -341,5 +364,7 @@ void LinkerKinetics::hop(Linker& linker, int side, int direction, Sites* sites, 
         return;
     sites->erase(siteOf(hand, linker.hands[side]));
     sites->insert(siteOf(hand, next));
+    if ((direction > 0) == (hand.speed > 0))
+        isCapturedAtSite(hand, next, random);
     linker.hands[side] = next;
 }

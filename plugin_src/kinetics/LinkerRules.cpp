@@ -29,3 +29,20 @@ bool LinkerKinetics::isInRange(const Hand& hand, const HandPlace& place) const {
                 fabs(place.position-contours.getEnd(place.chain, end)) <= own.range);
     return isNear != own.excluded;
 }
+
+/** Find where the second hand of a linker binds that loads as a pair; false if there is no free place. */
+bool LinkerKinetics::findPartner(const LinkerType& type, const HandPlace& first, const Sites* sites,
+        HandPlace& found) const {
+    const int number = type.hands[1];
+    const Hand& hand = system.hands[number];
+    found = {first.chain, first.position+type.loadingDistance};
+    if (contours.isClosed(found.chain))
+        found.position -= contours.getLength(found.chain)*floor(found.position/contours.getLength(found.chain));
+    else if (!contours.isWithin(found.chain, found.position))
+        return false;
+    if (binds[number][found.chain] == 0)
+        return false;
+    if (hand.siteSpacing > 0 && (!toSite(hand, found) || sites->count(siteOf(hand, found)) > 0))
+        return false;
+    return hand.bindingRange.end < 0 || isInRange(hand, found);
+}

@@ -96,11 +96,21 @@ struct LinkerType {
     bool transActivated = false;
     /** Whether hands unbind only where and when they could bind by these rules. */
     bool reversible = true;
+    /**
+     * If positive, both hands bind at once, the second one so far from the first one along the same chain, towards its
+     * plus end; and they unbind at once.
+     */
+    double loadingDistance = 0;
+    bool loadsPairs() const {
+        return loadingDistance > 0;
+    }
     bool hasAngles() const {
         return leastCosine > -1 || largestCosine < 1;
     }
     /** Whether a hand may bind while the other one is held, or is not. */
     bool mayBind(int side, bool isOtherHeld) const {
+        if (loadsPairs())
+            return side == 0 && !isOtherHeld;
         return !transActivated || (side == 1) == isOtherHeld;
     }
     /** Whether a hand stays as long as the other one is held. */
@@ -124,6 +134,20 @@ struct LinkerType {
     std::vector<Wall> walls = {};
     bool diffuses() const {
         return diffusion >= 0;
+    }
+};
+
+/** What captures hands that walk past it along a chain. */
+struct Barrier {
+    int chain;
+    /** The length along the chain. */
+    double position;
+    /** It captures hands that walk towards the plus end (1), the minus end (-1), or either (0). */
+    int direction;
+    /** How likely it captures a hand, which it then holds until it lets it go on with this rate. */
+    double captureProbability, releaseRate;
+    bool captures(double speed) const {
+        return speed != 0 && (direction == 0 || (direction > 0) == (speed > 0));
     }
 };
 
@@ -224,6 +248,7 @@ struct LinkerSystem {
     std::vector<LinkerType> types;
     std::vector<Place> anchors;
     double kT = 0;
+    std::vector<Barrier> barriers = {};
     /** Linkers that diffuse are within all of these, or those of their type. */
     std::vector<Wall> walls = {};
     const std::vector<Wall>& wallsOf(const LinkerType& type) const {

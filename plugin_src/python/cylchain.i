@@ -122,7 +122,7 @@ static void raiseException(const std::exception& e) {
         int& particles, int& chain1, int& segment1, int& chain2, int& segment2, int& hand1, int& hand2,
         int& table, int& pool, int& firstMonomer, int& lastMonomer, int& leastMonomers, int& monomersPerSegment,
         int& initialState, int& minusState, int& plusState, int& order, int& monomers, int& region, int& nucleator,
-        int& end, int& freeState, int& heldState};
+        int& end, int& freeState, int& heldState, int& direction};
 
 %typemap(in, numinputs=0) Vec3& point (OpenMM::Vec3 value) {
     $1 = &value;
@@ -239,7 +239,7 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         double& stallForce, double& volume, double& concentration, double& elementLength, double& stretchingModulus,
         double& bendingRigidity, double& shortening, double& rate, double& angle,
         double& distance, double& beyond, double& range, double& friction, double& diffusion, double& leastCosine,
-        double& largestCosine};
+        double& largestCosine, double& position, double& captureProbability, double& releaseRate};
 %apply bool& OUTPUT {bool& walksBackward, bool& holdsAtEnds, bool& sameChain, bool& vanishes, bool& isRegular,
         bool& bindsThere, bool& tracks, bool& planar, bool& excluded, bool& transActivated, bool& reversible};
 %apply long long& OUTPUT {long long& bindings, long long& unbindings};
@@ -460,6 +460,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %ignore OpenMM::CylinderChainBindingForce::getHand;
 %ignore OpenMM::CylinderChainBindingForce::getBranchJoint;
 %ignore OpenMM::CylinderChainBindingForce::getLinkerType;
+%ignore OpenMM::CylinderChainBindingForce::getBarriers;
 %ignore OpenMM::CylinderChainGrowthForce::getSystem;
 %ignore OpenMM::CylinderChainGrowthForce::getRanges;
 %ignore OpenMM::CylinderChainGrowthForce::getState;

@@ -394,13 +394,13 @@ def _filaments(entries, groups):
     entries.require("filament")
     numbers = entries["filament"] if isinstance(entries["filament"], tuple) else (entries["filament"],)
     for number in numbers:
-        _check_filament(entries, number, groups)
+        check_filament(entries, number, groups)
     if len(set(numbers)) < len(numbers):
         raise entries.at("filament").error(f"must name different filaments, but is {list(numbers)}.")
     return numbers
 
 
-def _check_filament(entries, number, groups):
+def check_filament(entries, number, groups):
     count = sum(group.count for group in groups)
     if number >= count:
         raise entries.at("filament").error(f"{number} does not exist; there are {count}, counted from 0.")
@@ -426,7 +426,7 @@ def check_place(place, groups, bodies=()):
         place.refuse(("filament", "arc_length", "segment", "fraction", "node"), "cannot be with a point.")
         return
     place.require("filament")
-    _check_filament(place, place["filament"], groups)
+    check_filament(place, place["filament"], groups)
     place.only_one("arc_length", "segment", "node")
     if not place.given("arc_length", "segment", "node"):
         raise place.error("lacks a place on the filament: give an arc_length, a segment or a node.")

@@ -193,6 +193,13 @@ LINKERS = TableKind(
             None,
             "Whether hands unbind only where and when they could bind by these two rules; true if not given.",
         ),
+        Key(
+            "loading_distance",
+            Quantity(units.LENGTH),
+            None,
+            "Both hands bind and unbind at once, the second one so far from the first towards the plus end: loop "
+            "extruders.",
+        ),
         Key("count", Whole(0, 10**7, "1000"), None, "How many there are."),
         Key(
             "concentration",
@@ -363,11 +370,15 @@ def binds_to(group, linkers):
     return any(hand.binds(group.type) for own in linkers for hand in own.kind.hands)
 
 
+_KIND_KEYS = (
+    *("stiffness", "rest_length", "same_filament", "name"),
+    *("cosine_range", "trans_activated", "reversible", "loading_distance"),
+)
+
+
 def _kind(entries):
     preset = PRESETS[entries["type"]] if "type" in entries else None
-    properties = entries.given(
-        "stiffness", "rest_length", "same_filament", "name", "cosine_range", "trans_activated", "reversible"
-    )
+    properties = entries.given(*_KIND_KEYS)
     with entries.naming():
         hands = _hands(entries, preset)
         if hands is not None:

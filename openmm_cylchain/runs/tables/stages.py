@@ -44,6 +44,7 @@ CHANGES = {
         *("hand", "hands", "stiffness", "rest_length", "same_filament", "count", "concentration", "volume", "bound"),
         "keep",
     ),
+    "barrier": ("toward", "release_rate", "capture_probability", "active"),
     "link": ("stiffness", "rest_length", "maximum_extension", "active"),
     "joint": ("stiffness", "angle", "active"),
     "tether": ("point", "stiffness", "velocity", "start_time", "active"),

@@ -216,6 +216,37 @@ void CylinderChainBindingForce::setLinkerTypeRules(int type, double leastCosine,
     own.reversible = reversible;
 }
 
+void CylinderChainBindingForce::setLinkerTypeLoading(int type, double distance) {
+    ASSERT_VALID_INDEX(type, types);
+    requireNotNegative(distance, "distance at which pairs of hands bind");
+    requireOfBinding(distance == 0 || types[type].hands[0] >= 0, "Anchored linkers have no pair of hands");
+    requireOfBinding(distance == 0 || distance >= getHand(types[type].hands[1]).siteSpacing,
+            "The distance at which pairs of hands bind must be that of their sites at least");
+    types[type].loadingDistance = distance;
+}
+
+int CylinderChainBindingForce::addBarrier(int chain, double position, int direction, double captureProbability,
+        double releaseRate) {
+    requireOfBinding(chain >= 0, "Illegal chain index: "+to_string(chain));
+    requireNotNegative(position, "place of a barrier");
+    requireOfBinding(direction >= -1 && direction <= 1, "Illegal direction: "+to_string(direction));
+    requireOfBinding(captureProbability >= 0 && captureProbability <= 1, "A probability must be between 0 and 1");
+    requireNotNegative(releaseRate, "rate at which a barrier lets go");
+    barriers.push_back({chain, position, direction, captureProbability, releaseRate});
+    return barriers.size()-1;
+}
+
+void CylinderChainBindingForce::getBarrierParameters(int index, int& chain, double& position, int& direction,
+        double& captureProbability, double& releaseRate) const {
+    ASSERT_VALID_INDEX(index, barriers);
+    const Barrier& own = barriers[index];
+    chain = own.chain;
+    position = own.position;
+    direction = own.direction;
+    captureProbability = own.captureProbability;
+    releaseRate = own.releaseRate;
+}
+
 void CylinderChainBindingForce::getLinkerTypeDiffusion(int type, double& diffusion, bool& planar) const {
     diffusion = getLinkerType(type).diffusion;
     planar = getLinkerType(type).planar;

@@ -115,6 +115,10 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
             require(type >= 0 && type < owner.getNumLinkerTypes() && system.types[type].hands[0] >= 0 &&
                     system.types[type].concentration == 0, "The joint of branches "+to_string(i)+" needs linkers with "
                     "two hands that come from no concentration");
+    system.barriers = owner.getBarriers();
+    for (const cylchain::Barrier& barrier : system.barriers)
+        require(barrier.chain < contours->getNumChains() && barrier.position <= contours->getLength(barrier.chain),
+                "There is a barrier on a chain that does not exist, or beyond the end of one");
     state = owner.getState();
     state.events.resize(system.types.size());
     checkDiffusion();

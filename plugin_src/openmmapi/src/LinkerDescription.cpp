@@ -158,6 +158,8 @@ void checkLinkers(const vector<Linker>& linkers, const LinkerSystem& system, con
         if (type.concentration >= 0 && !linker.isHeld(0) && !linker.isHeld(1))
             refuseLinkers(name+" is not bound, but those of its type are only counted while they are bound: their "
                     "concentration is given");
+        if (type.loadsPairs() && linker.isHeld(0) != linker.isHeld(1))
+            refuseLinkers(name+" has one hand bound, but those of its type bind and unbind both at once");
         for (int side = 0; side < 2; side++) {
             const HandPlace& place = linker.hands[side];
             if (!place.isBound()) {

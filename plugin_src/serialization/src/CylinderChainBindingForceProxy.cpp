@@ -53,10 +53,17 @@ static void write(const CylinderChainBindingForce& force, SerializationNode& nod
                 .setDoubleProperty("stiffness", type.stiffness).setBoolProperty("sameChain", type.sameChain)
                 .setDoubleProperty("volume", type.volume).setDoubleProperty("concentration", type.concentration)
                 .setDoubleProperty("diffusion", type.diffusion).setBoolProperty("planar", type.planar);
-        child.setDoubleProperty("leastCosine", type.leastCosine)
+        child.setDoubleProperty("loadingDistance", type.loadingDistance)
+                .setDoubleProperty("leastCosine", type.leastCosine)
                 .setDoubleProperty("largestCosine", type.largestCosine)
                 .setBoolProperty("transActivated", type.transActivated).setBoolProperty("reversible", type.reversible);
     }
+    SerializationNode& barriers = node.createChildNode("Barriers");
+    for (const cylchain::Barrier& barrier : force.getBarriers())
+        barriers.createChildNode("Barrier").setIntProperty("chain", barrier.chain)
+                .setDoubleProperty("position", barrier.position).setIntProperty("direction", barrier.direction)
+                .setDoubleProperty("captureProbability", barrier.captureProbability)
+                .setDoubleProperty("releaseRate", barrier.releaseRate);
     SerializationNode& anchors = node.createChildNode("Anchors");
     for (int i = 0; i < force.getNumAnchors(); i++) {
         int particle;
@@ -112,11 +119,16 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
         force->setLinkerTypeRules(number, type.getDoubleProperty("leastCosine"),
                 type.getDoubleProperty("largestCosine"), type.getBoolProperty("transActivated"),
                 type.getBoolProperty("reversible"));
+        force->setLinkerTypeLoading(number, type.getDoubleProperty("loadingDistance"));
         for (auto& wall : type.getChildren())
             force->addLinkerTypeWall(number, wall.getStringProperty("shape"), Vec3(wall.getDoubleProperty("x"),
                     wall.getDoubleProperty("y"), wall.getDoubleProperty("z")), Vec3(wall.getDoubleProperty("vx"),
                     wall.getDoubleProperty("vy"), wall.getDoubleProperty("vz")), wall.getDoubleProperty("length"));
     }
+    for (auto& barrier : node.getChildNode("Barriers").getChildren())
+        force->addBarrier(barrier.getIntProperty("chain"), barrier.getDoubleProperty("position"),
+                barrier.getIntProperty("direction"), barrier.getDoubleProperty("captureProbability"),
+                barrier.getDoubleProperty("releaseRate"));
     for (auto& anchor : node.getChildNode("Anchors").getChildren()) {
         const int particle = anchor.getIntProperty("particle");
         if (particle >= 0)

@@ -48,19 +48,13 @@ public:
      * @param temperature  the temperature T, measured in K; that of a CylinderChainIntegrator counts instead
      */
     explicit CylinderChainBindingForce(double temperature);
-    /**
-     * Get the temperature, measured in K.
-     */
+    /** Get the temperature, measured in K. */
     double getTemperature() const {
         return temperature;
     }
-    /**
-     * Set the temperature, measured in K.
-     */
+    /** Set the temperature, measured in K. */
     void setTemperature(double temperature);
-    /**
-     * Get the random number seed; with 0, each Context chooses one.
-     */
+    /** Get the random number seed; with 0, each Context chooses one. */
     int getRandomNumberSeed() const {
         return randomNumberSeed;
     }
@@ -71,9 +65,7 @@ public:
     void setRandomNumberSeed(int seed) {
         randomNumberSeed = seed;
     }
-    /**
-     * Get the number of kinds of hands.
-     */
+    /** Get the number of kinds of hands. */
     int getNumHands() const {
         return hands.size();
     }
@@ -96,9 +88,7 @@ public:
      * @param[out] unbindingRate  the rate of unbinding without load, measured in 1/ps
      */
     void getHandParameters(int hand, double& bindingRate, double& reach, double& unbindingRate) const;
-    /**
-     * Get the chains that a kind of hands binds to.
-     */
+    /** Get the chains that a kind of hands binds to. */
     const std::vector<int>& getHandChains(int hand) const;
     /**
      * Get how load makes a kind of hands unbind.
@@ -157,9 +147,7 @@ public:
      */
     void setHandAtEnd(int hand, int end, double range, bool bindsThere, bool tracks, int freeState, int heldState,
             const std::vector<int>& numbers);
-    /**
-     * Get what a kind of hands has to do with an end, see setHandAtEnd().
-     */
+    /** Get what a kind of hands has to do with an end, see setHandAtEnd(). */
     void getHandAtEnd(int hand, int& end, double& range, bool& bindsThere, bool& tracks, int& freeState,
             int& heldState, std::vector<int>& numbers) const;
     /**
@@ -182,9 +170,7 @@ public:
      * @param friction  the friction, measured in kJ ps/mol/nm^2, or 0 if they do not slide
      */
     void setHandSliding(int hand, double friction);
-    /**
-     * Get the rate at which hands of a kind cut filaments, see setHandSevering().
-     */
+    /** Get the rate at which hands of a kind cut filaments, see setHandSevering(). */
     double getHandSevering(int hand) const;
     /**
      * Let hands of a kind cut filaments that grow where they are bound, before the nearest monomer.
@@ -202,9 +188,7 @@ public:
      * hand, of all kinds with the same distance of sites.
      */
     void setHandSiteSpacing(int hand, double spacing);
-    /**
-     * Get the number of types of linkers.
-     */
+    /** Get the number of types of linkers. */
     int getNumLinkerTypes() const {
         return types.size();
     }
@@ -264,6 +248,41 @@ public:
      *                        is as likely as the other; else they always unbind
      */
     void setLinkerTypeRules(int type, double leastCosine, double largestCosine, bool transActivated, bool reversible);
+    /** Get how far the hands of linkers of a type are that bind at once, or 0, see setLinkerTypeLoading(). */
+    double getLinkerTypeLoading(int type) const {
+        return getLinkerType(type).loadingDistance;
+    }
+    /**
+     * Let both hands of linkers of a type bind at once, at the rate of the first one, and unbind at once, at the sum of
+     * the rates of both: extruders of loops.
+     *
+     * @param type      the number of the type, the linkers of which have two hands
+     * @param distance  how far from the first hand, towards the plus end of the same chain, the second one binds,
+     *                  measured in nm, not less than the distance of its sites; or 0 if they bind one after the other
+     */
+    void setLinkerTypeLoading(int type, double distance);
+    /** Get the number of barriers. */
+    int getNumBarriers() const {
+        return barriers.size();
+    }
+    /**
+     * Add a barrier, which captures hands that walk past it along a chain.
+     *
+     * @param chain               the chain, which does not grow
+     * @param position            the length along it, measured in nm
+     * @param direction           1 if it captures those that walk towards the plus end, -1 the minus end, 0 either
+     * @param captureProbability  how likely it captures a hand
+     * @param releaseRate         the rate at which it lets a hand go on, measured in 1/ps
+     * @return the number of the barrier
+     */
+    int addBarrier(int chain, double position, int direction, double captureProbability, double releaseRate);
+    /** Get a barrier, see addBarrier(). */
+    void getBarrierParameters(int index, int& chain, double& position, int& direction, double& captureProbability,
+            double& releaseRate) const;
+    /** Get all barriers.  This is for internal use. */
+    const std::vector<cylchain::Barrier>& getBarriers() const {
+        return barriers;
+    }
     /**
      * Get how linkers of a type diffuse while they are not bound.
      *
@@ -280,9 +299,7 @@ public:
      * @param planar     whether they stay in the plane z = 0; the rate of binding has the factor R'/R then
      */
     void setLinkerTypeDiffusion(int type, double diffusion, bool planar);
-    /**
-     * Get the number of walls that linkers of a type are within which diffuse, see addLinkerTypeWall().
-     */
+    /** Get the number of walls that linkers of a type are within which diffuse, see addLinkerTypeWall(). */
     int getNumLinkerTypeWalls(int type) const {
         return getLinkerType(type).walls.size();
     }
@@ -308,9 +325,7 @@ public:
      * @return the name of the shape
      */
     std::string getLinkerTypeWall(int type, int wall, Vec3& point, Vec3& vector, double& length) const;
-    /**
-     * Get the number of anchors.
-     */
+    /** Get the number of anchors. */
     int getNumAnchors() const {
         return anchors.size();
     }
@@ -335,9 +350,7 @@ public:
      * @param[out] point     the point, measured in nm
      */
     void getAnchor(int anchor, int& particle, Vec3& point) const;
-    /**
-     * Get the number of linkers.
-     */
+    /** Get the number of linkers. */
     int getNumLinkers() const {
         return state.linkers.size();
     }
@@ -379,14 +392,10 @@ public:
      */
     void setLinkers(const std::vector<int>& numbers, const std::vector<int>& types, const std::vector<int>& anchors,
             const std::vector<int>& chains, const std::vector<double>& places, int nextNumber);
-    /**
-     * Get all linkers of a Context at once, like getLinkers().
-     */
+    /** Get all linkers of a Context at once, like getLinkers(). */
     void getLinkersInContext(Context& context, std::vector<int>& numbers, std::vector<int>& types,
             std::vector<int>& anchors, std::vector<int>& chains, std::vector<double>& places, int& nextNumber) const;
-    /**
-     * Replace all linkers of a Context, like setLinkers().
-     */
+    /** Replace all linkers of a Context, like setLinkers(). */
     void setLinkersInContext(Context& context, const std::vector<int>& numbers, const std::vector<int>& types,
             const std::vector<int>& anchors, const std::vector<int>& chains, const std::vector<double>& places,
             int nextNumber) const;
@@ -409,9 +418,7 @@ public:
      * periodic box, they are not taken back into it.
      */
     void getUnboundPositionsInContext(Context& context, std::vector<int>& numbers, std::vector<double>& places) const;
-    /**
-     * Set where linkers of a Context are that diffuse and are not bound; all others stay where they are.
-     */
+    /** Set where linkers of a Context are that diffuse and are not bound; all others stay where they are. */
     void setUnboundPositionsInContext(Context& context, const std::vector<int>& numbers,
             const std::vector<double>& places) const;
     /**
@@ -423,21 +430,15 @@ public:
      * @param[out] unbindings  how often a hand has unbound, for whatever reason
      */
     void getNumEventsInContext(Context& context, int type, long long& bindings, long long& unbindings) const;
-    /**
-     * Get whether distances are those of nearest periodic images.
-     */
+    /** Get whether distances are those of nearest periodic images. */
     bool usesPeriodicBoundaryConditions() const {
         return periodic;
     }
-    /**
-     * Set whether distances are those of nearest periodic images.  They are not unless this is called.
-     */
+    /** Set whether distances are those of nearest periodic images.  They are not unless this is called. */
     void setUsesPeriodicBoundaryConditions(bool periodic) {
         this->periodic = periodic;
     }
-    /**
-     * Get the number of joints of branches.
-     */
+    /** Get the number of joints of branches. */
     int getNumBranchJoints() const {
         return branchJoints.size();
     }
@@ -454,30 +455,20 @@ public:
      */
     int addBranchJoint(int nucleator, const std::vector<int>& types, const std::vector<double>& parameters,
             const std::vector<double>& places);
-    /**
-     * Get a joint of branches, see addBranchJoint().
-     */
+    /** Get a joint of branches, see addBranchJoint(). */
     void getBranchJointParameters(int index, int& nucleator, std::vector<int>& types, std::vector<double>& parameters,
             std::vector<double>& places) const;
-    /**
-     * Get the linkers that every new Context begins with.  This is for internal use.
-     */
+    /** Get the linkers that every new Context begins with.  This is for internal use. */
     const cylchain::LinkerState& getState() const {
         return state;
     }
-    /**
-     * Get the description of a kind of hands.  This is for internal use.
-     */
+    /** Get the description of a kind of hands.  This is for internal use. */
     const cylchain::Hand& getHand(int hand) const;
-    /**
-     * Get the description of a joint of branches.  This is for internal use.
-     */
+    /** Get the description of a joint of branches.  This is for internal use. */
     const cylchain::BranchJoint& getBranchJoint(int index) const {
         return branchJoints[index];
     }
-    /**
-     * Get the description of a type of linkers.  This is for internal use.
-     */
+    /** Get the description of a type of linkers.  This is for internal use. */
     const cylchain::LinkerType& getLinkerType(int type) const;
     std::vector<cylchain::Place> findPlaces(const PlaceResolver& resolver) const;
 protected:
@@ -491,6 +482,7 @@ private:
     std::vector<cylchain::LinkerType> types;
     std::vector<cylchain::Place> anchors;
     std::vector<cylchain::BranchJoint> branchJoints;
+    std::vector<cylchain::Barrier> barriers;
     cylchain::LinkerState state;
 };
 

@@ -1,0 +1,192 @@
+"""Loops of long filaments: contact probability P(s), sparse contact maps, and the loops that linkers hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy
+
+from ..errors import InputError
+from ..units.quantities import LENGTH, positive, whole_number
+from ..units.types import FloatArray, IntArray, Scalar
+from .crossings import pairs_of_points
+from .runs import Run, require_run
+
+
+@dataclass(frozen=True)
+class ContactProbability:
+    """How likely two places along a filament are in contact, by the length s of filament between them.
+
+    Attributes
+    ----------
+    separations : (bins,) array
+        s in nm: the geometric mean of the separations of nodes in each bin.
+    values : (frames, bins) array
+        Of each frame: the share of pairs of nodes that are in contact, of all pairs in a bin.
+    """
+
+    separations: FloatArray
+    values: FloatArray
+
+    @property
+    def mean(self) -> FloatArray:
+        """P(s), the mean over frames: (bins,) array. ``statistics`` has errors of means of series."""
+        return self.values.mean(axis=0)
+
+
+def contact_probability(
+    run: Run, cutoff: Scalar, frames: range | None = None, bins_per_decade: int = 10
+) -> ContactProbability:
+    """The probability P(s) that two nodes of a filament with the contour length s between them are within a cutoff.
+
+    All filaments of a run count, those of all lengths; along a ring, s is the shorter way. Nodes stand for the places
+    of filaments, so segments should be shorter than the cutoff.
+
+    Parameters
+    ----------
+    run : Run
+        Whose filaments do not grow, and have segments of one length.
+    cutoff : length
+    frames : range, optional
+        Numbers of frames; all if not given.
+    bins_per_decade : int
+        Bins in the logarithm of s. Near neighbours have a bin each.
+
+    Raises
+    ------
+    InputError
+        For filaments that grow, or whose segments differ in length, and a cutoff beyond the width of the periodic box.
+    """
+    own = _frames(run, frames)
+    cutoff = positive(cutoff, LENGTH, "cutoff")
+    per_decade = whole_number(bins_per_decade, 1, "bins_per_decade")
+    length = _segment_length(run)
+    longest = max(len(each.nodes) // 2 if each.ring else len(each.nodes) - 1 for each in run.filaments)
+    decades = np.log10(longest + 1)
+    edges = np.unique(np.round(np.logspace(0.0, decades, int(np.ceil(per_decade * decades)) + 1))).astype(int)
+    possible = np.zeros(longest + 1)
+    for each in run.filaments:
+        possible += _pairs_by_separation(len(each.nodes), each.ring, longest)
+    bin_of = np.searchsorted(edges, np.arange(longest + 1), side="right") - 1
+    inside = np.arange(longest + 1) >= 1
+    pairs_in_bins = np.bincount(bin_of[inside], possible[inside], len(edges) - 1)
+    logarithms = np.bincount(bin_of[inside], (possible * np.log(np.maximum(np.arange(longest + 1), 1)))[inside])
+    rows = []
+    for first, second, filament in _contacts(run, own, cutoff):
+        separations = second - first
+        counts = np.array([len(each.nodes) for each in run.filaments])[filament]
+        rings = np.array([each.ring for each in run.filaments])[filament]
+        separations = np.where(rings, np.minimum(separations, counts - separations), separations)
+        rows.append(np.bincount(bin_of[separations], minlength=len(edges) - 1) / pairs_in_bins)
+    return ContactProbability(length * np.exp(logarithms / pairs_in_bins), np.array(rows))
+
+
+def contact_counts(
+    run: Run, cutoff: Scalar, bin_length: Scalar | None = None, frames: range | None = None
+) -> scipy.sparse.csr_array:
+    """How many pairs of nodes are within a cutoff, summed over frames, by the places of both along all filaments.
+
+    A map as that of a Hi-C experiment: symmetric and sparse. Its bins are stretches of filaments, one filament behind
+    the other, the last bin of each filament maybe shorter. A pair within a bin counts once, on the diagonal. Frames are
+    taken one after the other: the memory is that of the pairs of one frame, and of the map.
+
+    Parameters
+    ----------
+    run : Run
+        Whose filaments do not grow, and have segments of one length.
+    cutoff : length
+    bin_length : length, optional
+        Along filaments, rounded to a whole number of segments; a node has a bin of its own if not given.
+    frames : range, optional
+        Numbers of frames; all if not given.
+
+    Returns
+    -------
+    (bins, bins) scipy.sparse.csr_array of int64
+    """
+    own = _frames(run, frames)
+    cutoff, length = positive(cutoff, LENGTH, "cutoff"), _segment_length(run)
+    size = 1
+    if bin_length is not None:
+        size = max(1, round(positive(bin_length, LENGTH, "bin_length") / length))
+    counts = np.array([len(each.nodes) for each in run.filaments])
+    bins = -(-counts // size)
+    starts = np.cumsum(bins) - bins
+    total = int(bins.sum())
+    result = scipy.sparse.csr_array((total, total), dtype=np.int64)
+    for first, second, _ in _contacts(run, own, cutoff, among_filaments=True):
+        rows, columns = (starts[number] + along // size for number, along in (first, second))
+        apart = rows != columns
+        both = np.concatenate([rows, columns[apart]]), np.concatenate([columns, rows[apart]])
+        ones = np.ones(len(both[0]), dtype=np.int64)
+        result = result + scipy.sparse.coo_array((ones, both), (total, total)).tocsr()
+    return result
+
+
+def loop_lengths(run: Run, frame: int, kind: int | None = None) -> FloatArray:
+    """Lengths of the loops that linkers hold, with both hands on one filament: (loops,) array in nm.
+
+    Along a ring, the shorter way.
+
+    Parameters
+    ----------
+    run : Run
+    frame : int
+    kind : int, optional
+        Number of a type of linkers; all if not given.
+    """
+    require_run(run)
+    records = run.linkers[frame]
+    filaments = records["filaments"]
+    held = (filaments[:, 0] >= 0) & (filaments[:, 0] == filaments[:, 1])
+    if kind is not None:
+        held &= records["type"] == whole_number(kind, 0, "kind")
+    lengths = np.abs(np.diff(records["arc_lengths"][held], axis=1)[:, 0])
+    contours = np.array([float(own.type.segment_lengths(own.segments, own.ring).sum()) for own in run.filaments])
+    rings = np.array([own.ring for own in run.filaments], dtype=bool)
+    on = filaments[held, 0]
+    return np.where(rings[on], np.minimum(lengths, contours[on] - lengths), lengths)
+
+
+def _frames(run, frames):
+    require_run(run)
+    own = range(len(run)) if frames is None else frames
+    if not len(own) or min(own) < 0 or max(own) >= len(run):
+        raise InputError(f"frames must be numbers of frames, of which there are {len(run)}.")
+    return own
+
+
+def _segment_length(run):
+    if any(own.monomer_length for own in run.filaments):
+        raise InputError("Filaments grow: their nodes are not the same places along them in all frames.")
+    lengths = {own.type.segment_length for own in run.filaments}
+    if len(lengths) != 1:
+        raise InputError(f"Filaments must have segments of one length, but have {sorted(lengths)} nm.")
+    return lengths.pop()
+
+
+def _pairs_by_separation(nodes: int, ring: bool, longest: int) -> FloatArray:
+    separations = np.arange(longest + 1)
+    if not ring:
+        return np.maximum(nodes - separations, 0) * (separations > 0)
+    halves = np.where(2 * separations == nodes, 0.5, 1.0)
+    return nodes * halves * (separations > 0) * (2 * separations <= nodes)
+
+
+def _contacts(run: Run, frames: range, cutoff: float, among_filaments: bool = False) -> Iterator[tuple[Any, Any, Any]]:
+    # Of each frame, pairs of nodes: their numbers along one filament, and this; or a filament and a number of each.
+    counts = np.array([len(own.nodes) for own in run.filaments])
+    filament: IntArray = np.repeat(np.arange(len(counts)), counts)
+    along = np.arange(counts.sum()) - (np.cumsum(counts) - counts)[filament]
+    for frame in frames:
+        pairs = pairs_of_points(np.concatenate(run.nodes(frame)), cutoff, run.box)
+        first, second = pairs.first, pairs.second
+        if among_filaments:
+            yield (filament[first], along[first]), (filament[second], along[second]), None
+            continue
+        same = filament[first] == filament[second]
+        first, second = first[same], second[same]
+        yield np.minimum(along[first], along[second]), np.maximum(along[first], along[second]), filament[first]
