@@ -8,12 +8,14 @@ import openmm
 import pytest
 
 from openmm_cylchain import (
+    ACTIN_ATP,
     F_ACTIN,
     Body,
     Crosslinks,
     Cylinder,
     Ellipsoid,
     Filaments,
+    Growth,
     InputError,
     Plane,
     Slab,
@@ -107,6 +109,11 @@ def test_what_is_refused():
         filament_wall_force(filaments, system, plane, 1.0, side="on")
     with pytest.raises(InputError, match="one of all, ends, first, last"):
         filament_wall_force(filaments, system, plane, 1.0, nodes="middle")
+    grown = Filaments(VISCOSITY, TEMPERATURE)
+    growth = Growth(monomers=ACTIN_ATP, pool=1e-6, longest=1e3)
+    grown.add_straight(ACTIN.with_segment_length(108), 2, [0, 0, 0], [1, 0, 0], growth=growth)
+    with pytest.raises(InputError, match='Filament 0 grows: nodes must be "all"'):
+        filament_wall_force(grown, grown.build()[1], plane, 1.0, nodes="ends")
     force = filament_wall_force(filaments, system, plane, 1.0, side="surface")
     with pytest.raises(openmm.OpenMMException, match="several faces"):
         force.setRegion("box", openmm.Vec3(0, 0, 0), openmm.Vec3(1, 1, 1), 0)
