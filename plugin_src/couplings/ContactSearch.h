@@ -100,8 +100,8 @@ public:
      * Where that end is a joint, both segments there have half of the stiffness.
      *
      * A sphere on a path that comes nearer to the axis of a segment, or to another sphere, than 0.7 of the sum of radii
-     * touches where it is nearest on its way; its normal is that of x, and the gap is signed along it. Two spheres do so
-     * only where that makes their distance negative: one that is deep in another keeps its equilibrium.
+     * touches where it is nearest on its way; its normal is that of x, and the gap is signed along it. Two spheres do
+     * so only where that makes their distance negative: one that is deep in another keeps its equilibrium.
      *
      * Around a joint, segments that share it may see one and the same contact. It is counted once:
      * - A contact at a joint is that of the segment that ends there (s = 1), and of none if the distance falls as one

@@ -56,8 +56,8 @@ static void testPlanarJoints() {
 }
 
 /**
- * A sphere that goes through a rod or a sphere is pushed back; one that goes around it is not. One that is deep in a rod
- * has the side of it where it began, one that is deep in another sphere has its distance.
+ * A sphere that goes through a rod or a sphere is pushed back; one that goes around it is not. One that is deep in a
+ * rod has the side of it where it began, one that is deep in another sphere has its distance.
  */
 static void testSpheres() {
     mt19937_64 generator(13);

@@ -58,7 +58,9 @@ def test_rules_take_units_and_reach_the_force():
     assert hand.sliding_friction == pytest.approx(2.0 * PICONEWTON * SECOND / 1e3)
     assert hand.holds_at_ends and not replace(hand, at_end="release").holds_at_ends and not HAND.holds_at_ends
     near = replace(HAND, binding_range=BindingRange(end="both", range=0.1 * unit.micrometer, excluded=True))
-    kind = Crosslinker(hands=[hand, near], stiffness=0.1, cosine_range=np.array([0.5, 1]), trans_activated=True, reversible=False)
+    kind = Crosslinker(
+        hands=[hand, near], stiffness=0.1, cosine_range=np.array([0.5, 1]), trans_activated=True, reversible=False
+    )
     assert kind.cosine_range == (0.5, 1.0) and kind.has_rules and not replace(kind, hands=HAND).is_motor
     _, context = network((kind, {"count": 5}), (Crosslinker(hands=HAND, stiffness=0.1), {"count": 1}))
     text = openmm.XmlSerializer.serialize(context.getSystem())

@@ -5,10 +5,10 @@
 /** What random numbers of particles are for: see lanes/Noise.h. */
 enum {NOISE_PARTICLE = 4};
 
-/** Where a particle that the processor sees is in the arrays of OpenMM, and by how many vectors of the box it is wrapped. */
+/** Where a particle that the processor sees is in the arrays of OpenMM, and by how many box vectors it is wrapped. */
 enum {IMAGE_SLOT = 0, IMAGE_CELLS = 1, NUM_IMAGE_NUMBERS = 4};
 
-/** Numbers of such a particle: to the processor its position and the force on it, and back a position and a velocity. */
+/** Numbers of such a particle: to the processor its position and the force on it, back a position and a velocity. */
 enum {EXCHANGED_POSITION = 0, EXCHANGED_FORCE = 3, EXCHANGED_VELOCITY = 3, NUM_EXCHANGED = 6};
 
 /** Numbers of the flow: its velocity, its gradient row by row, and the origin. */

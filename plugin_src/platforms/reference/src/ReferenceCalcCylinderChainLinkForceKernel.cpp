@@ -12,7 +12,8 @@ static const int LINKS_OF_BLOCK = 1024;
 
 ReferenceCalcCylinderChainLinkForceKernel::ReferenceCalcCylinderChainLinkForceKernel(string name,
         const Platform& platform, shared_ptr<HostParticles> particles) :
-        CalcCylinderChainLinkForceKernel(name, platform), particles(particles), periodic(false), nearestParticles(false) {
+        CalcCylinderChainLinkForceKernel(name, platform), particles(particles), periodic(false),
+        nearestParticles(false) {
 }
 
 void ReferenceCalcCylinderChainLinkForceKernel::initialize(const System&, bool periodic, bool nearestParticles) {

@@ -20,7 +20,8 @@ static bool isFinite(const Vec3& v) {
 
 ReferenceIntegrateCylinderChainStepKernel::ReferenceIntegrateCylinderChainStepKernel(string name,
         const Platform& platform, shared_ptr<HostParticles> particles) :
-        IntegrateCylinderChainStepKernel(name, platform), particles(particles), chainKernel(NULL), others(NULL), versionOfNetwork(-1), versionOfLengths(-1), mixedChains(0) {
+        IntegrateCylinderChainStepKernel(name, platform), particles(particles), chainKernel(NULL), others(NULL),
+        versionOfNetwork(-1), versionOfLengths(-1), mixedChains(0) {
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system, const CylinderChainDescription&,
@@ -204,7 +205,8 @@ int ReferenceIntegrateCylinderChainStepKernel::advanceChains(ContextImpl&, const
     return *min_element(taken.begin(), taken.end());
 }
 
-template <class Engine> int ReferenceIntegrateCylinderChainStepKernel::advancePack(const Engine& engine, int pack, StepSettings settings, int count, long long& divided) {
+template <class Engine> int ReferenceIntegrateCylinderChainStepKernel::advancePack(const Engine& engine, int pack,
+        StepSettings settings, int count, long long& divided) {
     const double* box = chainKernel->getBox();
     double* forces = &particles->getForces()[0][0];
     const ParticleRange own = engine.getParticles(pack);

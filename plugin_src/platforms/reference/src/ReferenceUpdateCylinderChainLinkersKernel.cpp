@@ -6,7 +6,8 @@ using namespace std;
 
 ReferenceUpdateCylinderChainLinkersKernel::ReferenceUpdateCylinderChainLinkersKernel(string name,
         const Platform& platform, shared_ptr<HostParticles> particles) :
-        UpdateCylinderChainLinkersKernel(name, platform), particles(particles), periodic(false), nearestParticles(false) {
+        UpdateCylinderChainLinkersKernel(name, platform), particles(particles), periodic(false),
+        nearestParticles(false) {
 }
 
 void ReferenceUpdateCylinderChainLinkersKernel::initialize(const LinkerSystem& system, const ChainList& chains,
