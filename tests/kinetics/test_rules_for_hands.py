@@ -8,6 +8,7 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import (
+    ACTIN_ATP,
     F_ACTIN,
     MICROTUBULE,
     BindingRange,
@@ -243,3 +244,19 @@ def test_friction_of_hands_that_slide_adds_up():
         error = slid.std(ddof=1) / np.sqrt(copies)
         assert 4.0 * error < 0.06 * expected
         assert abs(slid.mean() - expected) < 4.0 * error
+
+
+@pytest.mark.parametrize("end, bound", [("plus", 20), ("minus", 0)])
+def test_hands_that_slide_and_track_an_end_stay_there(end, bound):
+    """Their springs pull them beyond the plus end, where all others let go."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    growth = Growth(monomers=ACTIN_ATP, pool=0.2e-6 * unit.molar, longest=600.0, minus_capped=True)
+    filaments.add_straight(F_ACTIN.with_segment_length(108.0), 3, [0, 0, 0], [1, 0, 0], clamped=[0], growth=growth)
+    tracks = HandAtEnd(end=end, range=20.0, tracks=True)
+    hand = replace(SLIDING, unbinding_rate=0.0, at_end="release", filament_end=tracks, sliding_friction=1e6)
+    filaments.add_linkers(Crosslinker(hands=hand, stiffness=0.05), anchors=[[345.0, 0, 0]] * 20, bound=20)
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 2e6, random_seed=1, checks=False)
+    context = new_context(system, positions, integrator)
+    integrator.step(1000)
+    assert filaments.in_context(context).linkers().counts()[2] == bound
