@@ -16,6 +16,8 @@ def add_attached(translation, options, count, segments):
         words = (options.text(key, default="").removesuffix("each")).split()
         own = translation.script.properties.get(words[-1]) if words else None
         place = _node(options, key, translation.made[-1], segments, taken)
+        if own is not None and len(words) == 1 and _moves(own) and _add_places(translation, own, options, key, count):
+            continue
         if own is None or own.kind != "single" or not _holds(translation, own) or place is None or len(words) > 1:
             translation.left_out(f"{key} = {', '.join(options.values(key))}", options.line_of(key), PLACED)
         elif translation.made[-1].grows:
@@ -25,12 +27,38 @@ def add_attached(translation, options, count, segments):
             _add_tether(translation, own, options, key, place, count)
 
 
+def _moves(own):
+    # Whether it is none that is tied to a point.
+    return own.kind == "couple" or (own.kind == "single" and own.settings.text("activity") != "fixed")
+
+
+def _add_places(translation, own, options, key, count):
+    # Whether its first hand begins at a place, on each of the filaments.
+    made = translation.made[-count:]
+    length, along = made[-1].length, place_along(options, key, made[-1].length)
+    inside = along is not None and 0.0 <= along <= length * (1.0 + 1e-9)
+    if not inside or options.text((key, 3), default="off") not in OFF:
+        return False
+    numbers = [one.number for one in made]
+    place = {"filament": numbers, "arc_length": quantity(min(along, length), "um")}
+    translation.attached.setdefault(own.name, []).append(place)
+    return True
+
+
+def place_along(options, key, length):
+    """How far in um from its first node an attachment to a filament is, by what stands behind a key; None if it is not
+    said in numbers."""
+    along, reference = options.number((key, 1), default=None), options.text((key, 2), default="minus_end")
+    if along is None or reference not in _REFERENCES:
+        return None
+    return {"plus_end": length - along, "center": 0.5 * length + along}.get(reference, along)
+
+
 def _node(options, key, made, segments, taken):
     # The free node that is nearest to a place, and how far from it in um; None if it is no place along the filament.
-    along, reference = options.number((key, 1), default=None), options.text((key, 2), default="minus_end")
-    if along is None or reference not in _REFERENCES or options.text((key, 3), default="off") not in OFF:
+    along = place_along(options, key, made.length)
+    if along is None or options.text((key, 3), default="off") not in OFF:
         return None
-    along = {"plus_end": made.length - along, "center": 0.5 * made.length + along}.get(reference, along)
     free = [node for node in (*range(segments), -1) if node not in taken]
     if not free or not 0.0 <= along <= made.length * (1.0 + 1e-9):
         return None

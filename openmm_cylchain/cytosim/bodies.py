@@ -6,17 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .directions import KEYS as DIRECTIONS
+from .directions import UnknownDirectionError, draw_direction, draw_second_orientation, fixed_direction
 from .document import EXACT, LEFT_OUT, NEAREST, Note, Table, point, quantity
 from .filaments import add_on_body, first_length, shared_growth
-from .places import (
-    UnknownDirectionError,
-    draw_direction,
-    draw_inside,
-    draw_position,
-    fixed_direction,
-    region_of,
-    unknown_position,
-)
+from .places import draw_inside, draw_position, region_of, unknown_position
 from .script import count_of
 from .settings import OFF, Settings
 
@@ -222,7 +216,9 @@ def _add_interpolated(translation, options, shape):
 
 def _single_of(translation, options, key, text):
     # How many, the name of a single and what stands behind it; none if there is no such single.
-    words = _ONE_SINGLE.fullmatch(text.strip().removeprefix("(").removesuffix(")").strip())
+    inner = text.strip()
+    inner = inner[1:-1].strip() if inner[:1] == "(" and inner[-1:] == ")" else inner
+    words = _ONE_SINGLE.fullmatch(inner)
     found = None if words is None else translation.script.properties.get(words[2])
     if found is None or found.kind != "single":
         translation.left_out(f"{text!r} of {key}", options.line_of(key), "bodies: what is attached to them")
@@ -243,9 +239,6 @@ def _hold(translation, options, key, text, shape, numbers, draw):
 
 def _local(translation, options, key, text, draw):
     # A place in the frame of a body.
-    text, _, condition = text.partition(" if ")
-    if condition:
-        translation.left_out(f"if {condition} of {key}", options.line_of(key), "positions: if")
     word = unknown_position(text, None)
     if word is not None:
         translation.left_out(f"{text!r} of {key}", options.line_of(key), f"positions: {word}")
@@ -289,10 +282,9 @@ def _add_table(translation, own, new, count, shape):
 
 
 def _steric_line(translation, table, settings):
-    steric = settings.text("steric")
     if translation.script.simul.text("steric") in OFF:
         return None
-    if steric not in OFF:
+    if settings.text("steric") not in OFF:
         return settings.line_of("steric")
     table.add("contacts", False, Note(EXACT, "steric is off"))
     return None
@@ -302,7 +294,7 @@ def _add_places(translation, table, new, count):
     options = new.settings
     text = options.text("position")
     fixed = options.text("placement") in ("off", "0", "none")
-    for key in ("placement", "position", "direction", "orientation"):
+    for key in ("placement", "position", *DIRECTIONS):
         options.values(key)
     space = translation.space(options.text(("position", 1)))
     word = None if text is None else unknown_position(text, space)
@@ -318,10 +310,12 @@ def _add_places(translation, table, new, count):
         if not fixed:
             translation.document.note(NEAREST, f"{new.name} is at the origin, since there is no space", new.line)
         text = "center"
-    region = region_of(text, draw) if count > 1 else None
-    direction = options.text("direction", "orientation", default="off" if fixed else None)
-    everywhere = count > 1 and text in (None, "inside") and space is not None and space.shape == "periodic"
-    first = None
+    turned = any(len(options.values(key)) > 1 for key in ("rotation", "orientation"))
+    region = region_of(text, draw) if count > 1 and not turned else None
+    direction = options.text(*DIRECTIONS, default="off" if fixed else None)
+    everywhere = text in (None, "inside") and space is not None and space.shape == "periodic"
+    everywhere = everywhere and count > 1 and not turned
+    first, second = None, None
     if region is not None or everywhere:
         table.add("count", count, Note(EXACT, "", new.line))
         if region is not None:
@@ -331,14 +325,19 @@ def _add_places(translation, table, new, count):
         if any(place is None for place in places):
             translation.document.note(NEAREST, f"{new.name}: places outside of the space are taken", new.line)
             places = [draw_inside(text, draw, keep=False) if place is None else place for place in places]
+        if turned:
+            turns = [draw_second_orientation(options, place, draw) for place in places]
+            places, second = [turn @ place for turn, place in zip(turns, places)], turns[0]
         if translation.dimensions == 2:
-            places = [[*place[:2], 0.0] for place in places]
-        first = np.array(places[0])
+            places = [np.array([*place[:2], 0.0]) for place in places]
+        first = places[0]
         table.add("positions", [point(place) for place in places], Note(EXACT, "", options.line_of("position")))
-    _add_direction(translation, table, options, direction, first, draw)
+    if second is not None and count > 1 and options.text(("rotation", 1), ("orientation", 1)) == "random":
+        direction = "random"
+    _add_direction(translation, table, options, direction, first, draw, second)
 
 
-def _add_direction(translation, table, options, direction, place, draw):
+def _add_direction(translation, table, options, direction, place, draw, second=None):
     if direction in (None, "random"):
         return
     line = options.line_of("direction")
@@ -352,6 +351,7 @@ def _add_direction(translation, table, options, direction, place, draw):
         word = direction.split()[0]
         translation.left_out(f"direction = {direction}, for which they have any", line, f"directions: {word}")
         return
+    vector = vector if second is None else second @ vector
     table.add("direction", [round(float(own), 12) for own in vector], Note(EXACT, "of its x axis", line))
 
 

@@ -27,6 +27,7 @@ def add_command(commands):
         default=[],
         help="value of a name in a template, in the place of the first one that it has there",
     )
+    parser.add_argument("--no-trial", action="store_true", help="do not try whether its first steps can be taken")
     parser.set_defaults(command=_import)
 
 
@@ -40,11 +41,11 @@ def _import(options):
             values[name] = float(value) if "." in value or "e" in value.lower() else int(value)
         except ValueError:
             values[name] = value
-    for line in import_file(options.file, options.output, options.dimensions, values):
+    for line in import_file(options.file, options.output, options.dimensions, values, not options.no_trial):
         print(line)
 
 
-def import_file(path, output, dimensions=None, given=None):
+def import_file(path, output, dimensions=None, given=None, trial=False):
     """Write a configuration from one of Cytosim, and return the lines of a report.
 
     Parameters
@@ -54,6 +55,8 @@ def import_file(path, output, dimensions=None, given=None):
     dimensions : {2, 3}, optional
     given : dict, optional
         Values of names in templates.
+    trial : bool
+        Whether to take the first steps of it, and shorter ones if these cannot be taken.
 
     Raises
     ------
@@ -61,6 +64,7 @@ def import_file(path, output, dimensions=None, given=None):
         If the file is none of Cytosim, has nothing that we can say, or the output exists.
     """
     from .translation import translate
+    from .trial import try_first_steps
 
     output = Path(output)
     if not output.parent.is_dir():
@@ -71,8 +75,10 @@ def import_file(path, output, dimensions=None, given=None):
     for name in translation.start_files:
         if (output.parent / name).exists():
             raise InputError(f"{output.parent / name} exists already: name another output.")
+    check(translation, translation.document.text(), path)
+    if trial:
+        try_first_steps(translation.document, lambda: check(translation, translation.document.text(), path))
     text = translation.document.text()
-    check(translation, text, path)
     for name, positions in translation.start_files.items():
         np.save(output.parent / name, positions)
     with open(output, "x", encoding="utf-8", newline="\n") as file:
@@ -81,7 +87,7 @@ def import_file(path, output, dimensions=None, given=None):
 
 
 def check(translation, text, path):
-    """Read a text as a run does. InputError with the line of Cytosim's file for what a run refuses."""
+    """Read a text as a run does: a Configuration. InputError with the line of Cytosim's file for what a run refuses."""
     from ..runs.configuration import configuration_of
     from ..runs.keys import ConfigurationError
     from ..runs.toml_lines import read_toml
@@ -90,7 +96,7 @@ def check(translation, text, path):
         for name, positions in translation.start_files.items():
             np.save(Path(folder) / name, positions)
         try:
-            configuration_of(read_toml(text), text, folder, {})
+            return configuration_of(read_toml(text), text, folder, {})
         except ConfigurationError as error:
             line = _line_of(translation.document, error.path)
             where = "" if line is None else f", line {line}"

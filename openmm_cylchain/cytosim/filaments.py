@@ -6,18 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from .attached import add_attached
-from .document import EXACT, NEAREST, Note, point, quantity
-from .grammar import ScriptError
-from .growth import longest_of, read_growth, same_growth
-from .places import (
+from .directions import KEYS as DIRECTIONS
+from .directions import (
     UnknownDirectionError,
     draw_direction,
-    draw_inside,
+    draw_orientation,
+    draw_second_orientation,
     fixed_direction,
-    frame_of,
-    region_of,
-    unknown_position,
 )
+from .document import EXACT, NEAREST, Note, point, quantity
+from .grammar import ScriptError
+from .growth import longest_of, read_growth, same_growth, still_growth
+from .places import draw_inside, region_of, unknown_position
 from .script import count_of
 from .settings import OFF
 
@@ -28,7 +28,7 @@ _LEAST_SHARE, _TRIALS = 0.05, 400
 _LENGTHS = 9
 """How many lengths stand for a distribution of them."""
 _RANGES = ("range", "position_range", "positions", "position_ends", "translation")
-_PLACEMENT = ("orientation", "direction", "position", "reference", "placement", *_RANGES)
+_PLACEMENT = (*DIRECTIONS, "position", "reference", "placement", *_RANGES)
 _OFF_PLACE = ("off", "outside", "surface")
 _PARTS, _MOST_PARTS = 20, 2000
 _MOST_SEGMENTS = 5_000_000
@@ -56,7 +56,7 @@ def add_filaments(translation, new):
     growing = shared_growth(translation, fiber, options)
     for key in ("length", "plus_end", "minus_end", "end_state", "mark"):
         options.values(key)
-    shape = _shape(translation, options)
+    shape = _shape(translation, fiber, options, lengths[0])
     if shape is not None:
         for _ in range(count):
             _add_shape(translation, fiber, options, shape, growing)
@@ -88,9 +88,15 @@ def add_on_body(translation, fiber, options, length, count, growing):
     return number, whole
 
 
-def shared_growth(translation, fiber, options):
-    """The Growing of fibers that are created with options, one for all that share monomers; None without growth."""
+def shared_growth(translation, fiber, options, begins=False):
+    """The Growing of fibers that are created with options, one for all that share monomers.
+
+    None without growth, but for those that begin during a run.
+    """
     growing = read_growth(translation, fiber, options)
+    if growing is None and begins:
+        growing = still_growth(fiber)
+        growing.entries.append(("severing_rate", "0 1/(um*s)", Note(EXACT, "it neither grows nor shrinks")))
     if growing is None:
         return None
     for other in translation.growings:
@@ -134,13 +140,13 @@ def _lengths(fiber, options):
     return [float(own) for own in lower + shares * (upper - lower)]
 
 
-def _shape(translation, options):
+def _shape(translation, fiber, options, length):
     # Points that a fiber begins with, as (n, 3), or None.
     for key in ("shape", "points"):
         if key not in options:
             continue
         if options.text(key) == "curved":
-            raise ScriptError(options.line_of("shape"), "the shape curved is not known here.")
+            return _arc(translation, fiber, options, length)
         points = np.array([options.vector(key, index) for index in range(len(options.values(key)))])
         if len(points) < 2 or np.any(np.linalg.norm(np.diff(points, axis=0), axis=1) == 0.0):
             raise options.mistake(key, "must be points that differ, separated by commas.")
@@ -148,6 +154,21 @@ def _shape(translation, options):
             points[:, 2] = 0.0
         return points
     return None
+
+
+def _arc(translation, fiber, options, length):
+    # Of a circle about the origin, or off it, whose middle points along a vector across x.
+    radius, off = options.number(("shape", 1), default=1.0), options.number(("shape", 3), default=0.0)
+    across = np.array(options.vector("shape", 2, default=(0.0, 1.0, 0.0)))
+    across[0] = 0.0
+    across[translation.dimensions :] = 0.0
+    segment, segments = segment_of(fiber, length, None)
+    if not (across.any() and 0.5 * segment < radius < math.inf and math.isfinite(off)):
+        raise options.mistake("shape", "must have a radius above half a segment, and a vector across x.")
+    turn = 2.0 * math.asin(0.5 * segment / radius)
+    angles = turn * (np.arange(segments + 1) - 0.5 * (segments + 1))
+    up = radius * np.cos(angles) - off
+    return np.outer(radius * np.sin(angles), [1.0, 0.0, 0.0]) + np.outer(up, across / np.linalg.norm(across))
 
 
 def segment_of(fiber, length, growing):
@@ -266,8 +287,8 @@ def add_growth(translation, name, table, fiber, length, growing):
     inner = translation.document.table(f"[{name}.growth]", table.line)
     inner.add("monomers", growing.name)
     inner.add("longest", quantity(longest, "um"), note)
-    least = fiber.settings.number("min_length", default=0.008)
-    if 0.0 < least < length:
+    least = min(fiber.settings.number("min_length", default=0.008), length)
+    if least > 0.0:
         inner.add("shortest", quantity(max(least, growing.monomer), "um"), Note(EXACT, "min_length", fiber.line))
     for key, value, own in growing.entries:
         inner.add(key, value, own)
@@ -300,13 +321,15 @@ def _with_equal_steps(nodes, segment):
 
 
 def _placed(translation, options, nodes):
-    draw = translation.draw_in(translation.space(), options.line)
-    if "position" not in options and "direction" not in options and "orientation" not in options:
+    space = _own_space(translation, options)
+    draw = translation.draw_in(space, options.line)
+    if space is None and not any(key in options for key in ("position", *DIRECTIONS)):
         translation.document.note(NEAREST, "a fiber with a shape stays where its points are", options.line)
         return nodes
-    place = draw_inside(options.text("position"), draw, keep=False)
-    direction = draw_direction(options.text("direction", "orientation"), place, draw)
-    return (nodes - nodes.mean(axis=0)) @ frame_of(direction, np.array([0.0, 0.0, 1.0])).T + place
+    place = draw_inside(options.text("position", default="center" if space is None else "inside"), draw, keep=False)
+    nodes = nodes @ draw_orientation(options, place, draw).T + place
+    second = draw_second_orientation(options, place, draw)
+    return nodes if second is None else nodes @ second.T
 
 
 def _add_group(translation, fiber, options, length, count, growing, note=None):
@@ -342,7 +365,7 @@ def _read_placement(translation, options):
         )
         options.set("position", ["inside"], options.line_of("position"))
     draw = translation.draw_in(space, options.line)
-    for key in ("direction", "orientation"):
+    for key in DIRECTIONS:
         try:
             draw_direction(options.text(key), np.array([0.3, 0.2, 0.0]), draw)
         except UnknownDirectionError:
@@ -362,9 +385,9 @@ def _add_region(translation, table, options, whole, count):
         return False
     if options.text("reference", default="center") != "center" or options.text("placement") in _OFF_PLACE:
         return False
-    if any(key in options for key in _RANGES):
+    if any(key in options for key in _RANGES) or any(len(options.values(key)) > 1 for key in DIRECTIONS):
         return False
-    direction = options.text("direction", "orientation")
+    direction = options.text(*DIRECTIONS)
     fixed = fixed_direction(direction) if direction else None
     if direction not in (None, "random") and fixed is None:
         return False
@@ -430,7 +453,7 @@ def _remove(table, keys):
 def _one_place(translation, options, whole, number, count):
     space = _own_space(translation, options)
     draw = translation.draw_in(space, options.line)
-    direction = options.text("direction", "orientation")
+    direction = options.text(*DIRECTIONS)
     key = "position_range" if "position_range" in options else "range"
     placement = options.text("placement", default="inside")
     if "position_ends" in options:
@@ -459,4 +482,7 @@ def _one_place(translation, options, whole, number, count):
     shift = np.array(options.vector("translation", default=(0.0, 0.0, 0.0)))
     if translation.dimensions == 2:
         place[2] = shift[2] = 0.0
+    second = draw_second_orientation(options, place, draw)
+    if second is not None:
+        place, vector = second @ place, second @ vector
     return place - share * whole * vector + shift, vector

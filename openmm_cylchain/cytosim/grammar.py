@@ -93,7 +93,7 @@ class _Reader:
     def skip(self, blank=False):
         """Skip spaces, and comments and ends of lines too if ``blank``; whether anything is left."""
         while self.at < len(self.text):
-            if self.sign == "%" and blank:
+            if blank and (self.sign == "%" or self.text.startswith("/*", self.at)):
                 self.skip_comment()
             elif self.sign.isspace() and (blank or self.sign != "\n"):
                 self.at += 1
@@ -105,6 +105,11 @@ class _Reader:
         if self.text.startswith("%{", self.at):
             self.at += 1
             self.bracket()
+        elif self.sign == "/":
+            end = self.text.find("*/", self.at + 2)
+            if end < 0:
+                raise ScriptError(self.line, '"/*" has no "*/" that closes it.')
+            self.at = end + 2
         else:
             end = self.text.find("\n", self.at)
             self.at = len(self.text) if end < 0 else end

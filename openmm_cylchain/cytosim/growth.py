@@ -125,10 +125,16 @@ def _of_still(translation, fiber, cutting):
     # Fibers that do nothing but be cut.
     if cutting is None:
         return None
+    growing = still_growth(fiber)
+    _add_cutting(translation, growing, cutting)
+    return growing
+
+
+def still_growth(fiber):
+    """The Growing of fibers whose ends neither grow nor shrink."""
     growing = Growing(fiber.name, fiber.settings, _usual_monomer(fiber.settings))
     for end in _ENDS:
         _cap(growing, end)
-    _add_cutting(translation, growing, cutting)
     return growing
 
 
@@ -338,6 +344,8 @@ def add_monomers(translation, growings):
         if not math.isfinite(total):
             table.add("concentration", quantity(_REFERENCE, "uM"), Note(EXACT, "which gives the speeds above"))
             continue
+        if total <= 0.0:
+            raise growing.settings.mistake("total_polymer", "must be positive.")
         free = max(0.0, 1.0 - growing.length / total)
         table.add("concentration", quantity(_REFERENCE * free, "uM"), Note(EXACT, f"{free:.3g} of the polymer is free"))
         volume = total / growing.monomer / (_REFERENCE * _PER_UM3)

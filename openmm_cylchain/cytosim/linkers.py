@@ -5,10 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .attached import GROWING, PLACED
+from .attached import GROWING, PLACED, place_along
 from .bodies import attach_to_bodies, point_of_base
 from .document import EXACT, LEFT_OUT, NEAREST, Note, point, quantity
 from .hands import read_hand
+from .nucleation import add_nucleators
 from .places import draw_inside, unknown_position
 from .script import count_of
 from .settings import OFF
@@ -16,6 +17,8 @@ from .settings import OFF
 _PAIRS = "rules for pairs of hands"
 _MOST_ANCHORS = 50_000
 _HALF_OF_NO_SPACE = 5.0
+_NEAR, _SOON = "10 nm", "1e+06 1/s"
+"""Within what, and how soon, a nucleator holds what it has made."""
 _RANGE_AND_LAW = (
     "k_on/(2 reach) exp(-U/kT) for each length within reach of a hand that is tied, which has an equilibrium; in "
     "Cytosim it is k_on wherever a fiber is within reach, however strained"
@@ -35,11 +38,26 @@ _COUPLES = {
 
 @dataclass
 class Linked:
-    """What is created of one single or couple: how many, how many of them bound, and points of anchors."""
+    """What is created of one single or couple: how many, how many of them bound, points of anchors, and places.
+
+    ``places`` are the places on filaments of those whose first hands begin there.
+    """
 
     count: int = 0
     bound: int = 0
     points: list = field(default_factory=list)
+    places: list = field(default_factory=list)
+    nucleators: list = field(default_factory=list)
+
+    @property
+    def held(self):
+        """How many begin at places."""
+        return sum(len(own["filament"]) for own in self.places)
+
+    def hold(self, site, count):
+        """A count of them begin at a site, unless it is None."""
+        if site is not None:
+            self.places.append({**site["at"], "filament": [site["made"].number] * count})
 
 
 def add_linkers(translation, news):
@@ -47,7 +65,10 @@ def add_linkers(translation, news):
 
     ``news`` are Newly created objects, with how many filaments and tables of bodies were there before them.
     """
-    kinds = {}
+    kinds = {
+        name: Linked(sum(len(own["filament"]) for own in places), 0, [], places)
+        for name, places in translation.attached.items()
+    }
     for new, *translation.there in news:
         own = translation.script.named(new.name, new.kind, new.line)
         linked = kinds.setdefault(new.name, Linked())
@@ -60,9 +81,11 @@ def add_linkers(translation, news):
         for bodies in translation.bodies:
             if bodies.singles.get(name):
                 _table_on_bodies(translation, own, bodies, bodies.singles[name])
+        if linked.nucleators:
+            _table_of_nucleators(translation, own, linked)
         if linked.points or linked.count:
             (_couple_table if own.kind == "couple" else _single_table)(translation, own, linked)
-        elif name not in on_bodies:
+        elif name not in on_bodies and not linked.nucleators:
             own.settings.take_rest()
 
 
@@ -82,10 +105,13 @@ def _couples(translation, own, new, linked):
     keys = [key for key in ("attach1", "attach2", "site1", "site2") if key in options]
     if len(keys) < 2:
         for key in keys:
-            if len(options.values(key)) > 1 or translation.find_filament(options.text(key)) is not None:
-                translation.left_out(f"{key} of {new.name}", options.line_of(key), PLACED)
-            else:
+            site = _site(translation, options, key)
+            if site is None:
                 linked.bound += count
+            elif key in ("attach1", "site1"):
+                linked.hold(site, count)
+            else:
+                translation.left_out(f"{key} of {new.name}", options.line_of(key), PLACED)
         linked.count += count
         return
     hands = _hands_of(translation, own)
@@ -94,11 +120,11 @@ def _couples(translation, own, new, linked):
         translation.left_out(f"where {count} {new.name} are attached", new.line, PLACED)
         linked.count += count
         linked.bound += count
-    elif any(place["grows"] for place in places):
+    elif any(place["made"].grows for place in places):
         translation.left_out(f"{count} {new.name} that join for ever", new.line, GROWING)
     else:
         for _ in range(count):
-            _link(translation, own, new, places[0]["at"], places[1]["at"])
+            _link(translation, own, new, *map(_joined, places))
 
 
 def _site(translation, options, key):
@@ -106,18 +132,17 @@ def _site(translation, options, key):
     made = translation.find_filament(options.text(key))
     if made is None:
         return None
-    along = options.number((key, 1), default=None)
+    along = place_along(options, key, made.length)
     if along is None:
         return None
-    reference = options.text((key, 2), default="minus_end")
-    along = {"plus_end": made.length - along, "center": 0.5 * made.length + along}.get(reference, along)
     along = min(max(along, 0.0), made.length)
-    at = {"filament": made.number, "arc_length": quantity(along, "um")}
-    if along == made.length:
-        at = {"filament": made.number, "node": -1}
-    elif along == 0.0:
-        at = {"filament": made.number, "node": 0}
-    return {"at": at, "grows": made.grows}
+    return {"at": {"filament": made.number, "arc_length": quantity(along, "um")}, "made": made, "along": along}
+
+
+def _joined(site):
+    # A site as a place of a [[link]].
+    node = {0.0: 0, site["made"].length: -1}.get(site["along"])
+    return site["at"] if node is None else {"filament": site["made"].number, "node": node}
 
 
 def _link(translation, own, new, first, second):
@@ -172,7 +197,17 @@ def _singles(translation, own, new, linked):
     if not fixed:
         linked.count += count
         return
-    linked.points += _points(translation, new, count, len(linked.points))
+    points, hand = _points(translation, new, count, len(linked.points)), _nucleator(translation, own)
+    if hand is not None and add_nucleators(translation, new, hand.settings, points):
+        linked.nucleators += points
+    else:
+        linked.points += points
+
+
+def _nucleator(translation, own):
+    # The Property of its hand if that makes fibers.
+    hand = translation.script.properties.get(own.settings.peek("hand"))
+    return hand if hand is not None and hand.settings.peek("activity") == "nucleate" else None
 
 
 def _join_body(translation, own, new, count):
@@ -181,28 +216,33 @@ def _join_body(translation, own, new, count):
     (hand,) = _hands_of(translation, own)
     if site is None or base is None or not hand.stays:
         translation.left_out(f"where {count} {new.name} are attached", new.line, PLACED)
-    elif site["grows"]:
+    elif site["made"].grows:
         translation.left_out(f"{count} {new.name} that join for ever", new.line, GROWING)
     else:
         for _ in range(count):
-            _link(translation, own, new, site["at"], {"body": base[0], "body_point": base[1]})
+            _link(translation, own, new, _joined(site), {"body": base[0], "body_point": base[1]})
 
 
 def _attached(translation, own, new, linked, count, key):
     options = new.settings
     site = _site(translation, options, key)
     (hand,) = _hands_of(translation, own)
-    if site is None or not hand.stays or own.settings.text("activity") != "fixed":
+    fixed = own.settings.text("activity") == "fixed"
+    points = _points(translation, new, count, len(linked.points)) if fixed else []
+    if site is None:
         translation.left_out(f"where {count} {new.name} are attached", new.line, PLACED)
-        if own.settings.text("activity") == "fixed":
-            linked.points += _points(translation, new, count, len(linked.points))
-        else:
-            linked.count += count
-    elif site["grows"]:
-        translation.left_out(f"{count} {new.name} that hold for ever", new.line, GROWING)
+    if not fixed:
+        linked.count += count
+        linked.hold(site, count)
+    elif site is None:
+        linked.points += points
+    elif not hand.stays or site["made"].grows:
+        # Those that begin bound come first.
+        linked.points[linked.held : linked.held] = points
+        linked.hold(site, len(points))
     else:
-        for place in _points(translation, new, count, 0):
-            _link(translation, own, new, site["at"], {"point": point(place)})
+        for place in points:
+            _link(translation, own, new, _joined(site), {"point": point(place)})
 
 
 def _points(translation, new, count, before):
@@ -248,6 +288,7 @@ def _single_table(translation, own, linked):
     if fixed:
         table.add("hand", hand.table, Note(NEAREST, _RANGE_AND_LAW))
         table.add("anchors", [point(place) for place in linked.points], Note(EXACT, "activity = fixed"))
+        _add_bound(table, own, linked, hand)
         settings.values("diffusion")
     else:
         idle = {"binding_rate": "0 1/s", "reach": hand.table["reach"], "unbinding_rate": "0 1/s"}
@@ -255,6 +296,21 @@ def _single_table(translation, own, linked):
         _add_count(translation, table, own, linked, hand)
     for note in hand.notes:
         table.comment(note)
+
+
+def _table_of_nucleators(translation, own, linked):
+    # They hold the minus ends of what they make.
+    hand = translation.script.properties[own.settings.text("hand")].settings
+    table = translation.document.table("[[linkers]]", own.line)
+    table.add("name", own.name, Note(EXACT, f"single {own.name}", own.line))
+    _add_spring(translation, table, own)
+    types = dict.fromkeys([translation.type_name(hand.text(("nucleate", 1)))])
+    at_end = {"end": "minus", "range": _NEAR, "binds_there": True, "tracks": True}
+    held = {"binding_rate": _SOON, "reach": _NEAR, "unbinding_rate": "0 1/s", "filament_end": at_end}
+    note = Note(NEAREST, "it binds at once to the first node of what begins where it is")
+    table.add("hand", {**held, "binds_to": list(types)}, note)
+    table.add("anchors", [point(place) for place in linked.nucleators], Note(EXACT, "activity = fixed"))
+    _read_rest(own.settings)
 
 
 def _table_on_bodies(translation, own, bodies, points):
@@ -299,9 +355,6 @@ def _couple_table(translation, own, linked):
     else:
         table.comment(Note(NEAREST, f"its hands bind to two filaments; in Cytosim to one as well, {loop:g} um apart"))
     _add_count(translation, table, own, linked, hands[0])
-    if linked.bound:
-        bound = min(linked.bound, linked.count)
-        table.add("bound", bound, Note(NEAREST, "attach1: one hand is bound, at random"))
     _add_rules(table, settings)
     if activity in _COUPLES:
         settings.take_rest()
@@ -357,9 +410,23 @@ def _add_spring(translation, table, own):
         table.add("rest_length", quantity(length, "um"), note)
 
 
+def _add_bound(table, own, linked, hand):
+    # How many begin with their first hands bound, and where.
+    if linked.places:
+        if "site_spacing" in hand.table:
+            table.comment(Note(LEFT_OUT, "where they begin bound: to sites, at random here", own.line, PLACED))
+            table.add("bound", linked.held)
+        else:
+            table.add("bound_at", linked.places, Note(EXACT, "where their first hands are attached"))
+    elif linked.bound:
+        bound = min(linked.bound, linked.count)
+        table.add("bound", bound, Note(NEAREST, "attach1: one hand is bound, at random"))
+
+
 def _add_count(translation, table, own, linked, hand):
     settings = own.settings
     table.add("count", linked.count, Note(EXACT, ""))
+    _add_bound(table, own, linked, hand)
     fast = settings.text("diffusion") == "fast" or settings.flag("fast_diffusion")
     if settings.text("confine") in ("on", "surface"):
         table.comment(Note(LEFT_OUT, "confine = on", settings.line_of("confine"), "surfaces: linkers on one"))

@@ -2,16 +2,17 @@
 
 import math
 
+from .directions import KEYS as DIRECTIONS
+from .directions import fixed_direction
 from .document import EXACT, NEAREST, Note, quantity
 from .filaments import add_growth, add_type, first_length, segment_of, shared_growth
 from .grammar import read_commands
-from .places import fixed_direction, region_of
-from .settings import Settings
+from .places import box_around, box_of
+from .settings import CONFINED, Settings
 
 _EVENTS = "events during a run"
 _WITHOUT_EFFECT = ("report", "write", "export", "save", "mark")
-_MOST_PLACES = 500
-_SPHERE_OR_BOX = ("sphere", "box")
+_MOST_PLACES, _MOST_NUCLEATORS = 500, 500
 
 
 def add_event(translation, new):
@@ -39,6 +40,19 @@ def _rate(options):
     return None
 
 
+def _is_held(fiber, space, translation):
+    # Whether walls hold a fiber in a space.
+    settings = fiber.settings
+    return (
+        space is not None
+        and bool(space.walls)
+        and space.volume is not None
+        and settings.text("confine") in CONFINED
+        and translation.space(settings.confining_space()) is space
+        and settings.number(("confine", 1), "confine_stiffness", default=0.0) > 0.0
+    )
+
+
 def _begins(translation, new, command, rate):
     # Whether a command of an event is a [[nucleation]], which is written then.
     words = [word for word in command.words if word != "fiber"]
@@ -46,40 +60,77 @@ def _begins(translation, new, command, rate):
     if command.verb != "new" or fiber is None or fiber.kind != "fiber" or len(words) > 1:
         return False
     options = Settings.of(f"new {fiber.name}", command.line, command.block)
-    growing = shared_growth(translation, fiber, options)
+    return _add_nucleation(translation, new, fiber, options, rate)
+
+
+def add_nucleators(translation, new, hand, places):
+    """Add hands that make fibers, and are tied to places: whether they could be added.
+
+    Each of them has a [[nucleation]] of its own, of one filament at a time, as it holds one as long as that is there.
+    """
+    rate, name = hand.number("nucleate", default=0.0), hand.text(("nucleate", 1), default="")
+    fiber, block = translation.script.properties.get(name), hand.block("nucleate", 2)
+    stays = hand.number("unbinding_rate", "unbinding", default=0.0) == 0.0
+    holds = hand.text("hold_end", "track_end", default="minus_end") == "minus_end"
+    if rate <= 0.0 or fiber is None or fiber.kind != "fiber" or not (stays and holds):
+        return False
+    if len(places) > _MOST_NUCLEATORS:
+        return False
+    note = Note(EXACT, f"nucleate = {rate:g}, of one {new.name}", hand.line_of("nucleate"))
+    for place in places:
+        options = Settings.of(f"new {name}", hand.line_of("nucleate"), block)
+        options.set("position", [" ".join(f"{own:.9g}" for own in place)], new.line)
+        if not _add_nucleation(translation, new, fiber, options, (rate, note), 1):
+            return False
+    for key in ("activity", "binding_rate", "binding", "binding_range", "unbinding_force", "nucleate"):
+        hand.values(key)
+    return True
+
+
+def _add_nucleation(translation, new, fiber, options, rate, places=None):
+    # Whether it could be added; ``places`` of filaments, or as many as begin.
+    growing = shared_growth(translation, fiber, options, begins=True)
     space = translation.space(options.text(("position", 1)))
-    draw = translation.draw_in(space, command.line)
+    draw = translation.draw_in(space, options.line)
     text = options.text("position")
-    everywhere = text is None and space is not None and space.shape == "periodic"
-    region = None if everywhere else region_of(text, draw)
-    if growing is None or translation.dimensions == 2:
+    everywhere = text is None and translation.dimensions == 3 and space is not None and space.shape == "periodic"
+    region, (frequency, note) = None if everywhere else box_of(text, draw), rate
+    if region is None and text in (None, "inside") and _is_held(fiber, space, translation):
+        # Walls keep those from beginning that are outside.
+        region = box_around(space.middle, space.half)
+        share = space.volume / math.prod(2.0 * own for own in space.half if own > 0.0)
+        text = f"rate = {frequency:g} in the space, and more around it, where walls let none begin"
+        frequency, note = frequency / share, Note(NEAREST, text, note.line)
+    if region is None and not everywhere:
         return False
-    if not everywhere and (region is None or region["shape"] not in _SPHERE_OR_BOX):
-        return False
-    frequency, note = rate
+    direction = options.text(*DIRECTIONS)
+    fixed = fixed_direction(direction) if direction else None
+    signs = [1.0] if fixed is None or not fixed[1] else [1.0, -1.0]
+    if fixed is None and direction not in (None, "random"):
+        word = direction.split()[0]
+        translation.left_out(f"direction = {direction}", options.line_of("direction"), f"directions: {word}")
     length = first_length(fiber, options)
     segment, _ = segment_of(fiber, length, growing)
-    table = translation.document.table("[[nucleation]]", new.line)
-    places = min(_MOST_PLACES, math.ceil(1.2 * frequency * translation.duration) + 5)
-    table.add("count", places, Note(NEAREST, "places: so many can be there at once"))
-    table.add("total_rate", quantity(frequency, "1/s"), note)
-    if region is not None:
-        table.add("inside", region, Note(NEAREST, "where the first node is; in Cytosim, the middle"))
-    direction = options.text("direction", "orientation")
-    fixed = fixed_direction(direction) if direction else None
-    if fixed is not None and not fixed[1]:
-        table.add("direction", [float(own) for own in fixed[0]], Note(EXACT, "", options.line_of("direction")))
-    elif direction not in (None, "random"):
-        translation.left_out(
-            f"direction = {direction}", options.line_of("direction"), f"directions: {direction.split()[0]}"
+    for sign in signs:
+        table = translation.document.table("[[nucleation]]", new.line)
+        share = frequency / len(signs)
+        most = min(_MOST_PLACES, math.ceil(1.2 * share * translation.duration) + 5)
+        table.add(
+            "count", places or most, Note(NEAREST, "places: so many can be there at once") if not places else None
         )
-    add_type(translation, table, fiber, segment, length)
-    table.add(
-        "length",
-        quantity(max(2, round(length / growing.monomer)) * growing.monomer, "um"),
-        Note(EXACT, "", command.line),
-    )
-    add_growth(translation, "nucleation", table, fiber, length, growing)
+        table.add("total_rate", quantity(share, "1/s"), note)
+        if region is not None:
+            where = Note(NEAREST, "where the first node is; in Cytosim, the middle") if not places else Note(EXACT, "")
+            table.add("inside", region, where)
+        if fixed is not None:
+            note_of_two = Note(EXACT, "half of them have the opposite direction" if len(signs) > 1 else "")
+            table.add("direction", [sign * float(own) for own in fixed[0]], note_of_two)
+        if translation.dimensions == 2:
+            table.add("planar", True, Note(EXACT, "two dimensions: they stay in the plane z = 0"))
+        add_type(translation, table, fiber, segment, length)
+        whole = max(2, round(length / growing.monomer)) * growing.monomer
+        table.add("length", quantity(whole, "um"), Note(EXACT, "", options.line))
+        add_growth(translation, "nucleation", table, fiber, whole, growing)
     for key in ("reference", "placement", "plus_end", "minus_end", "end_state"):
         options.values(key)
     translation.note_unused(options, "new fiber")

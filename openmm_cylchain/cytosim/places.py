@@ -1,104 +1,19 @@
-"""Where objects begin: POSITION and DIRECTION of Cytosim (``doc/sim/placement.md``, ``src/sim/primitives.cc``); in um.
+"""Where objects begin: POSITION of Cytosim (``doc/sim/placement.md``, ``src/sim/primitives.cc``); in um.
 
 Each primitive is a function that draws a point; some are regions as well, within which runs draw places themselves.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from .directions import ROTATIONS, rotation_of, towards
 from .document import point, quantity
-from .grammar import ScriptError
-from .settings import as_vector
+from .drawing import TRIES, Words, draw_where, flat, split_condition
 from .spaces import disc_region
 
-_TRIES = 2000
-
-
-class UnknownDirectionError(ScriptError):
-    """A direction that is not known here."""
-
-
-@dataclass
-class Draw:
-    """What places are drawn with: a Space or None, dimensions, a random generator, and the line of messages."""
-
-    space: object
-    dimensions: int
-    generator: object
-    line: int
-
-    def mistake(self, message):
-        """A ScriptError at its line."""
-        return ScriptError(self.line, message)
-
-    def half(self, count=1):
-        """Uniform between -1/2 and 1/2."""
-        return self.generator.uniform(-0.5, 0.5, count)
-
-    def unit(self):
-        """A random direction."""
-        while True:
-            vector = self.generator.normal(size=3)
-            vector[self.dimensions :] = 0.0
-            length = np.linalg.norm(vector)
-            if length > 1e-9:
-                return vector / length
-
-    @property
-    def radius(self):
-        """That of the space, if it is a sphere."""
-        if self.space is None or self.space.shape != "sphere":
-            raise self.mistake("places on the surface of a space that is no sphere are not known here.")
-        return float(self.space.half[0])
-
-    def ball(self, dimensions=None):
-        """A random point of the unit ball."""
-        count = dimensions or self.dimensions
-        while True:
-            vector = np.zeros(3)
-            vector[:count] = self.generator.uniform(-1.0, 1.0, count)
-            if vector @ vector <= 1.0:
-                return vector
-
-    def inside(self):
-        """A random point of the space."""
-        place = None if self.space is None else self.space.draw(self.generator)
-        if place is None:
-            raise self.mistake("places inside a space are asked for, but there is none whose shape is known here.")
-        return place
-
-
-class _Words:
-    # Words and numbers of a position, in turn.
-    def __init__(self, text):
-        self._words, self._at = text.split(), 0
-
-    @property
-    def word(self):
-        return self._words[self._at] if self._at < len(self._words) else ""
-
-    def take(self):
-        word, self._at = self.word, self._at + 1
-        return word
-
-    def numbers(self, most=3):
-        found = []
-        while len(found) < most and self.word:
-            try:
-                number = float(self.word)
-            except ValueError:
-                break
-            if not math.isfinite(number):
-                break
-            found.append(number)
-            self._at += 1
-        return found
-
-    def vector(self):
-        numbers = self.numbers()
-        return np.array([*numbers, *[0.0] * (3 - len(numbers))])
+_THIN = 1e-6
+"""Half of an edge in um of a box that is none."""
 
 
 def _axis(letter, along, across):
@@ -119,7 +34,7 @@ def _disc(draw, numbers, letter):
 
 def _cylinder(draw, numbers, letter):
     length, radius = (*numbers, 0.0, 0.0)[:2]
-    return _flat(draw, _axis(letter, length * draw.half()[0], radius * draw.ball(2)[:2]))
+    return flat(draw, _axis(letter, length * draw.half()[0], radius * draw.ball(2)[:2]))
 
 
 def _circle(draw, numbers, letter):
@@ -132,7 +47,7 @@ def _circle(draw, numbers, letter):
 def _ring(draw, numbers, letter):
     length, radius, thickness = (*numbers, 0.0, 0.0, 0.0)[:3]
     angle, own = draw.generator.uniform(0.0, 2.0 * np.pi), radius * (1.0 + thickness * draw.half()[0])
-    return _flat(draw, _axis(letter, length * draw.half()[0], own * np.array([np.cos(angle), np.sin(angle)])))
+    return flat(draw, _axis(letter, length * draw.half()[0], own * np.array([np.cos(angle), np.sin(angle)])))
 
 
 def _arc(draw, numbers, _):
@@ -156,7 +71,7 @@ def _line(draw, numbers, _):
 
 
 def _rectangle(draw, numbers, _):
-    return _flat(draw, np.array((*numbers, 0.0, 0.0, 0.0)[:3]) * draw.half(3))
+    return flat(draw, np.array((*numbers, 0.0, 0.0, 0.0)[:3]) * draw.half(3))
 
 
 def _square(draw, numbers, _):
@@ -167,10 +82,32 @@ def _ellipse(draw, numbers, _):
     return np.array((*numbers, 0.0, 0.0, 0.0)[:3]) * draw.ball()
 
 
+def _ellipse_surface(draw, numbers, _):
+    return np.array((*numbers, 0.0, 0.0, 0.0)[:3]) * draw.unit()
+
+
+def _cap(draw, numbers, letter):
+    # On a sphere, and no further than a height below its pole.
+    radius, height = (*numbers, 0.0)[:2]
+    along = max(radius - height * draw.generator.uniform(), -radius)
+    across, angle = math.sqrt(radius**2 - along**2), draw.generator.uniform(0.0, 2.0 * np.pi)
+    if draw.dimensions == 2:
+        return np.array([across if angle < np.pi else -across, along, 0.0])
+    return _axis(letter, along, across * np.array([np.cos(angle), np.sin(angle)]))
+
+
+def _outside_sphere(draw, numbers, _):
+    for _ in range(TRIES):
+        place = draw.inside()
+        if np.linalg.norm(place) >= (*numbers, 0.0)[0]:
+            return place
+    raise draw.mistake("no place was found outside of that sphere.")
+
+
 def _equator(draw, numbers, _):
     radius, thickness = (*numbers, *(1.0, 0.0)[len(numbers) :])[:2]
     angle = draw.generator.uniform(0.0, 2.0 * np.pi)
-    return _flat(draw, np.array([radius * np.cos(angle), radius * np.sin(angle), thickness * draw.half()[0]]))
+    return flat(draw, np.array([radius * np.cos(angle), radius * np.sin(angle), thickness * draw.half()[0]]))
 
 
 def _stripe(draw, numbers, _):
@@ -192,7 +129,7 @@ def _within_plane(draw, numbers, letters):
 def _along_x(weight):
     def place(draw, numbers, _):
         first, second = (*numbers, -10.0, 10.0)[:2] if numbers else (-10.0, 10.0)
-        for _ in range(_TRIES):
+        for _ in range(TRIES):
             own = draw.inside()
             if draw.generator.uniform() < weight(own[0], first, second):
                 return own
@@ -217,25 +154,22 @@ def _edge(draw, numbers, _):
     return radius * draw.generator.uniform(least, 1.0) ** (1.0 / draw.dimensions) * draw.unit()
 
 
-def _flat(draw, vector):
-    if draw.dimensions == 2:
-        vector[2] = 0.0
-    return vector
-
-
 _PRIMITIVES = {
     "inside": lambda draw, numbers, _: draw.inside(),
     "random": lambda draw, numbers, _: draw.inside(),
     "center": lambda draw, numbers, _: np.zeros(3),
     "origin": lambda draw, numbers, _: np.zeros(3),
     "arc": _arc,
+    "cap": _cap,
     "ball": lambda draw, numbers, _: numbers[0] * draw.ball(),
     "circle": _circle,
     "cylinder": _cylinder,
     "disc": _disc,
     "ellipse": _ellipse,
+    "ellipse_surface": _ellipse_surface,
     "equator": _equator,
     "line": _line,
+    "outside_sphere": _outside_sphere,
     "rectangle": _rectangle,
     "ring": _ring,
     "sphere": _shell,
@@ -249,19 +183,25 @@ _PRIMITIVES = {
     "gradient": _along_x(_gradient),
     "exponential": _along_x(lambda x, first, scale: math.exp((first - x) / scale) if x >= first else 0.0),
 }
+_CHANGES = ("at", "blur", "to", "or", "add", "flip", "turn", "align")
 _ON_SPHERES = ("surface", "edge")
-_WITH_AXIS = {"cylinder": "X", "disc": "Z", "circle": "Z", "ring": "X"}
+_WITH_AXIS = {"cylinder": "X", "disc": "Z", "circle": "Z", "ring": "X", "cap": "Z"}
 _NEED_NUMBER = {"ball", "cylinder", "disc", "circle", "sphere", "arc", "line", "rectangle", "ring", "ellipse"}
+_NEED_NUMBER |= {"cap", "ellipse_surface"}
 
 
 def unknown_position(text, space):
     """The word of a position in a Space or none that is not known here, or None."""
-    words = _Words(text)
+    words = Words(split_condition(text)[0])
     if words.numbers() and not words.word:
         return None
     while words.word:
         word = words.take()
-        if word in ("at", "blur", "to", "or", "add", "flip", "turn", "align", "angle", "degree"):
+        if word == "turn":
+            while words.word in ROTATIONS:
+                words.take()
+                words.numbers(4)
+        if word in _CHANGES:
             words.numbers()
             continue
         if _named(word)[0] not in _PRIMITIVES:
@@ -284,8 +224,12 @@ def _named(word):
 
 
 def draw_position(text, draw):
-    """A random point of a POSITION, or None if it is not allowed."""
-    words = _Words(text or "inside")
+    """A random point of a POSITION."""
+    text, condition = split_condition(text or "inside")
+    return draw_where(condition, lambda: _moved(Words(text), draw), draw)
+
+
+def _moved(words, draw):
     place = _primitive(words, draw)
     while words.word:
         word = words.take()
@@ -296,16 +240,16 @@ def draw_position(text, draw):
         elif word == "flip":
             place = -place
         elif word == "blur":
-            place = place + (words.numbers(1) or [0.0])[0] * _flat(draw, draw.generator.normal(size=3))
+            place = place + (words.numbers(1) or [0.0])[0] * flat(draw, draw.generator.normal(size=3))
         elif word == "to":
             return place + (_primitive(words, draw) - place) * draw.generator.uniform()
         elif word == "or":
             other = _primitive(words, draw)
             place = other if draw.generator.uniform() < 0.5 else place
         elif word == "turn":
-            place = _rotation(words, draw) @ place
+            place = rotation_of(words, draw) @ place
         elif word == "align":
-            place = _towards(words.vector(), draw) @ place
+            place = towards(words.vector(), draw) @ place
         else:
             raise draw.mistake(f"{word!r} in a position is not known here.")
     return place
@@ -316,7 +260,7 @@ def _primitive(words, draw):
         vector = words.vector()
         if words.word and not words.word[0].isalpha():
             raise draw.mistake(f"{words.word!r} in a position is no number.")
-        return _flat(draw, vector)
+        return flat(draw, vector)
     name, letter = _named(words.take())
     if name not in _PRIMITIVES:
         raise draw.mistake(f"the position {name!r} is not known here.")
@@ -326,38 +270,9 @@ def _primitive(words, draw):
     return _PRIMITIVES[name](draw, numbers, letter)
 
 
-def _rotation(words, draw):
-    # About z by an angle, or what takes x to a vector.
-    word = words.take() if words.word[:1].isalpha() else "vector"
-    if word in ("angle", "degree"):
-        angle = (words.numbers(1) or [0.0])[0] * (1.0 if word == "angle" else math.pi / 180.0)
-        cosine, sine = math.cos(angle), math.sin(angle)
-        return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    if word != "vector":
-        raise draw.mistake(f"the rotation {word!r} is not known here.")
-    return _towards(words.vector(), draw)
-
-
-def _towards(vector, draw):
-    # A rotation that takes x to a vector, any of them in space.
-    if not vector.any():
-        raise draw.mistake("the rotation has no direction.")
-    return frame_of(vector / np.linalg.norm(vector), np.array([0.0, 0.0, 1.0]) if draw.dimensions == 2 else draw.unit())
-
-
-def frame_of(direction, up):
-    """A rotation matrix that takes x to a unit vector, and z about to another."""
-    side = np.cross(up, direction)
-    while np.linalg.norm(side) < 1e-6:
-        up = up[[2, 0, 1]]
-        side = np.cross(up, direction)
-    side /= np.linalg.norm(side)
-    return np.stack([direction, side, np.cross(direction, side)], axis=1)
-
-
 def region_of(text, draw):
     """The region of a POSITION that is one of ours, as a table; None for others, and for points."""
-    words = _Words(text or "inside")
+    words = Words(text or "inside")
     name, letter = _named(words.take())
     numbers = words.numbers()
     center = np.zeros(3)
@@ -381,64 +296,55 @@ def region_of(text, draw):
     return None
 
 
-def fixed_direction(text):
-    """A direction that is the same for all, and whether half have the opposite one; None if it is neither."""
-    words = text.split() if text else []
-    opposite = bool(words) and words[0] == "parallel"
-    words = words[1:] if opposite else words
-    named = {"X": (1, 0, 0), "Y": (0, 1, 0), "Z": (0, 0, 1), "horizontal": (1, 0, 0), "vertical": (0, 1, 0)}
-    named |= {"off": (1, 0, 0), "identity": (1, 0, 0)}
-    if len(words) == 1 and words[0] in named:
-        return named[words[0]], opposite or words[0] in ("horizontal", "vertical")
-    try:
-        vector = as_vector(" ".join(words), 0, "direction")
-    except ScriptError:
+def box_of(text, draw):
+    """A region in which first nodes of filaments are, as a table: that of a POSITION, flat or thin ones as well.
+
+    None where it is neither a box nor a sphere.
+    """
+    space = draw.space
+    if text in (None, "inside", "random"):
+        if space is None:
+            return None
+        if draw.dimensions == 3 and space.region is not None:
+            return space.region if space.region["shape"] in ("sphere", "box") else None
+        if space.shape not in ("square", "periodic", "strip"):
+            return None
+        return box_around(space.middle, space.half)
+    region = region_of(text, draw) if draw.dimensions == 3 else None
+    if region is not None and region["shape"] in ("sphere", "box"):
+        return region
+    words, center = Words(text), np.zeros(3)
+    if not words.word[:1].isalpha():
+        place = words.vector()
+        return None if words.word else box_around(place, np.zeros(3))
+    name, letter = _named(words.take())
+    numbers = words.numbers()
+    if words.word == "at":
+        words.take()
+        center = words.vector()
+    sizes = np.array((*numbers, 0.0, 0.0, 0.0)[:3])
+    if words.word or (name in _NEED_NUMBER and not numbers):
         return None
-    return (vector, opposite) if any(vector) else None
+    if name in ("center", "origin"):
+        sizes = np.zeros(3)
+    elif name in ("line", "cylinder") and sizes[1] == 0.0:
+        sizes = _axis(letter if name == "cylinder" else "X", sizes[0], 0.0)
+    elif name == "square":
+        sizes = np.array([*[numbers[0] if numbers else 1.0] * 2, 0.0])
+    elif name != "rectangle":
+        return None
+    return box_around(center, 0.5 * sizes)
 
 
-def draw_direction(text, place, draw):
-    """A unit vector of a DIRECTION at a place. ScriptError for one that is not known here."""
-    if not text or text == "random":
-        return draw.unit()
-    if " or " in f" {text} ":
-        text = text.split(" or ")[int(draw.generator.integers(0, text.count(" or ") + 1))]
-    fixed = fixed_direction(text)
-    if fixed is not None:
-        vector, opposite = np.array(fixed[0], dtype=float), fixed[1]
-        vector[draw.dimensions :] = 0.0
-        if not vector.any():
-            raise draw.mistake(f"the direction {text!r} leaves the plane.")
-        return vector / np.linalg.norm(vector) * (-1.0 if opposite and draw.generator.uniform() < 0.5 else 1.0)
-    words = text.split()
-    if words[-1] in ("XY", "XZ", "YZ") and words[:-1] in ([], ["parallel"]):
-        vector = _flat(draw, np.array([draw.generator.normal() if own in words[-1] else 0.0 for own in "XYZ"]))
-        return vector / np.linalg.norm(vector)
-    radial = place / np.linalg.norm(place) if np.linalg.norm(place) > 0.0 else draw.unit()
-    if words[0] in ("radial", "antiradial"):
-        return radial if words[0] == "radial" else -radial
-    if words[0] in ("circular", "orthoradial"):
-        around = np.cross([0.0, 0.0, 1.0] if draw.dimensions == 2 else draw.unit(), radial)
-        return around / np.linalg.norm(around)
-    if (
-        draw.space is not None
-        and draw.space.shape == "sphere"
-        and words[0] in ("normal", "outward", "inward", "tangent")
-    ):
-        if words[0] != "tangent":
-            return -radial if words[0] == "inward" else radial
-        across = np.cross(np.array([0.0, 0.0, 1.0]) if draw.dimensions == 2 else draw.unit(), radial)
-        return across / np.linalg.norm(across)
-    if words[0] == "orthogonal" and len(words) > 1:
-        across = np.cross(as_vector(" ".join(words[1:]), draw.line, "direction"), draw.unit())
-        if np.linalg.norm(across) > 0.0:
-            return across / np.linalg.norm(across)
-    raise UnknownDirectionError(draw.line, f"the direction {text!r} is not known here.")
+def box_around(center, half):
+    """A box as a table, with next to no width where it has none."""
+    half = np.maximum(np.abs(half), _THIN)
+    return {"shape": "box", "lower": point(center - half), "upper": point(center + half)}
 
 
 def draw_inside(text, draw, keep=True):
     """A random point of a POSITION that is in the space, if ``keep``; None if there is none."""
-    for _ in range(_TRIES):
+    for _ in range(TRIES):
         place = draw_position(text, draw)
         if not keep or draw.space is None or draw.space.inside(place[None])[0]:
             return place

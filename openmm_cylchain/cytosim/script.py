@@ -330,7 +330,8 @@ class _Follower:
             # A count such as [10 * volume] is known with the space.
             count = first if first.startswith("[") else int(first)
             script.created.append(New(count, own, name, settings, command.line))
-            if own == "fiber" and _grows(script.properties[name]):
+            fibers = script.properties.get(settings.text(("fibers", 1))) if own == "aster" else None
+            if (own == "fiber" and _grows(script.properties[name])) or (fibers is not None and _grows(fibers)):
                 script.broken.append((command.line, f"new {' '.join(words)}, which grows"))
 
         return self._add(command, f"new {' '.join(words)}", create)

@@ -17,6 +17,8 @@ IGNORED = frozenset(
 
 OFF = (None, "0", "off", "none")
 """What a key has whose feature is off."""
+CONFINED = ("inside", "all_inside", "1")
+"""What confine has of what is held within a space."""
 
 
 class Settings:

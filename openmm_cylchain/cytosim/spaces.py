@@ -155,10 +155,10 @@ def _square(sizes, dimensions):
     half = _flat([*half, *others], dimensions)
     sides = half[:dimensions]
     surface = None if dimensions == 2 else 8.0 * (half[0] * half[1] + half[1] * half[2] + half[0] * half[2])
-    box = _box(half)
-    return Space(
-        "square", half, lambda at: np.all(np.abs(at) <= half, -1), float(np.prod(2 * sides)), surface, [box], box
-    )
+    # Spheres of bodies fit between walls above and below a plane.
+    wall = _box([own or 2.0 * max(half) for own in half])
+    volume = float(np.prod(2 * sides))
+    return Space("square", half, lambda at: np.all(np.abs(at) <= half, -1), volume, surface, [wall], _box(half))
 
 
 def _capsule(sizes, dimensions):

@@ -9,11 +9,11 @@ from ..errors import InputError
 from .bodies import KINDS as BODY_KINDS
 from .bodies import add_bodies
 from .document import LEFT_OUT, NEAREST, Document
+from .drawing import Draw
 from .filaments import add_filaments
 from .growth import add_monomers
 from .linkers import add_linkers
 from .nucleation import add_event
-from .places import Draw
 from .script import New, count_of, read_script
 from .settings import Settings
 from .simulation import (
@@ -44,6 +44,7 @@ _NEEDS = {
     ("fiber", "glue"): "surfaces: glue",
 }
 """What keys need that nothing here asks for, by the kind of what has them."""
+_DYNAMIC = ("dynamic_ellipse", "dynamic_sphere")
 _WITH_EVERY_LENGTH = ("rectangle", "square", "periodic", "strip", "semi_periodic", "ellipse", "dice")
 _SEED = 1
 
@@ -63,6 +64,8 @@ class Translation:
         self.nucleated = []
         # How many filaments and tables of bodies there are when what is translated is created; None for all.
         self.bodies, self.there = [], None
+        # Places on filaments of linkers that begin there, by the names of singles and couples.
+        self.attached = {}
         self.growings, self.made, self.filament_count, self.start_files = [], [], 0, {}
         self._spaces, self._type_names = {}, {}
         self.dimensions = self._find_dimensions(dimensions)
@@ -226,7 +229,11 @@ class Translation:
                 continue
             own = self.script.named(new.name, "space", new.line)
             shape = own.settings.text("shape", "geometry", default="")
-            space = make_space(shape, [new.settings, own.settings], self.dimensions, self._folder)
+            still = shape.removeprefix("dynamic_") if shape in _DYNAMIC else shape
+            space = make_space(still, [new.settings, own.settings], self.dimensions, self._folder)
+            if space is not None and still != shape:
+                own.settings.take_rest()
+                self.left_out(f"forces on {new.name}, which keeps its shape", new.line, f"spaces: {shape}")
             if new.name not in self._spaces:
                 self._spaces[new.name] = space
             if space is None:

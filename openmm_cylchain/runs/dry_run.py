@@ -1,6 +1,7 @@
 """What a run would be, without one: what is built, what binds its step, how long it takes, how large its files get."""
 
 import tempfile
+import time
 
 import numpy as np
 
@@ -121,14 +122,24 @@ def _binding(configuration, recommended):
 def _stages(stages, current):
     # In turn, with a few steps of each, which is to say that each can be begun.
     yield "  stages, each of which takes its first steps:"
-    first, known = current, set()
     lasts = {stage.number: last for stage, last in named_stages(stages)}
-    for stage in stages:
+    for stage in take_first_steps(stages, current, _STEPS_OF_STAGE):
         if not stage.is_piece:
             last = lasts[stage.number]
             count = last.number - stage.number + 1
             divided = f", in {count} pieces" if count > 1 else ""
             yield f"    {stage.name}: from {format_time(stage.begin)} to {format_time(last.end)}{divided}"
+
+
+def take_first_steps(stages, current, count, most_seconds=float("inf")):
+    """Take a count of steps of each stage in turn, or fewer where they take long; each Stage before its steps.
+
+    ``current`` are the Simulation and the BuiltSystem of the first one, where it begins. InputError and
+    InstabilityError as in a run.
+    """
+    first, known, start = current, set(), time.process_time()
+    for stage in stages:
+        yield stage
         if id(stage.configuration) in known:
             continue
         known.add(id(stage.configuration))
@@ -136,7 +147,9 @@ def _stages(stages, current):
             if stage.number:
                 before, current = current, stage_simulation(stage, first)
                 carry_over(before, current, stage, stages[0].configuration.simulation.seed)
-            current[0].step(_STEPS_OF_STAGE)
+            for _ in range(min(count, stage.configuration.simulation.steps)):
+                if time.process_time() - start < most_seconds:
+                    current[0].step(1)
 
 
 def _cost(configuration, stages, simulation, filaments):

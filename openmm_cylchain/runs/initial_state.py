@@ -208,7 +208,7 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
     for own, entries in zip(configuration.linkers if kinetics else (), configuration.tables["linkers"]):
         anchors = _anchors(own, configuration, filaments)
         # What is within reach of an anchor is known when overlaps have come apart: see ``relaxation``.
-        later = anchors is not None and configuration.relaxes
+        later = anchors is not None and configuration.relaxes and own.bound_at is None
         with entries.naming():
             filaments.add_linkers(
                 own.kind,
@@ -221,6 +221,7 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
                 diffusion=own.diffusion,
                 planar=own.planar,
                 region=own.region,
+                places=own.bound_at,
             )
     add_holding_linkers(configuration, filaments, seed)
     return filaments

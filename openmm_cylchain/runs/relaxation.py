@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 
-from openmm import Context, OpenMMException, Platform
+import numpy as np
+from openmm import Context, OpenMMException, Platform, unit
 
 from ..errors import InputError, InstabilityError
 from ..kinetics.binding_force import find_binding_force, place_linkers
@@ -14,6 +15,8 @@ from .initial_state import box_vectors, build_system
 _COLD, _WARM = (1e-3, 1e-2, 0.1, 0.5), (0.1, 0.5, 1.0)
 _STEPS = 20
 _COLD_TEMPERATURE = 1.0
+_MOST_SHIFTS, _SHIFT = 3, 0.1
+"""How often a filament is shifted that does not come apart, and how far along each axis, in diameters of contacts."""
 _ALL_STEPS = _STEPS * (len(_COLD) + len(_WARM))
 
 
@@ -21,7 +24,8 @@ def relaxed_positions(configuration, built, say=None):
     """Positions in which a run begins: those of a BuiltSystem, or where contacts have pushed what overlapped.
 
     Linkers that begin bound near anchors are bound then, which a Context has that is made or initialised later.
-    It takes 140 steps without linkers: in the cold, in steps that grow, and then at the temperature of the solvent.
+    It takes 140 steps without linkers: in the cold, in steps that grow, and then at the temperature of the solvent. A
+    filament that would have to go through another one is shifted by a tenth of a diameter, up to three times.
     The result depends on the configuration alone.
 
     Parameters
@@ -107,18 +111,35 @@ def _come_apart(configuration, positions, progress, begun=None):
         context = Context(alone.system, integrator, reference)
     except OpenMMException as error:
         raise refusal(error, alone.system, integrator, reference) from None
-    context.setPositions(positions)
-    try:
-        for bath, lengths in ((_COLD_TEMPERATURE, _COLD), (temperature, _WARM)):
-            integrator.setTemperature(bath)
-            for length in lengths:
-                integrator.setStepSize(length * longest)
-                for _ in range(_STEPS):
-                    integrator.step(1)
-                    progress.one_is_done()
-    except (InstabilityError, OpenMMException) as error:
-        raise InputError(
-            f"[contacts] filaments that overlap at first have not come apart: {error} Begin with fewer filaments, "
-            "with a smaller diameter or time_step, or set relax = false."
-        ) from None
-    return context.getState(positions=True).getPositions(asNumpy=True)
+    for shift in range(_MOST_SHIFTS + 1):
+        context.setPositions(positions)
+        try:
+            for bath, lengths in ((_COLD_TEMPERATURE, _COLD), (temperature, _WARM)):
+                integrator.setTemperature(bath)
+                for length in lengths:
+                    integrator.setStepSize(length * longest)
+                    for _ in range(_STEPS):
+                        integrator.step(1)
+                        if shift == 0:
+                            progress.one_is_done()
+            return context.getState(positions=True).getPositions(asNumpy=True)
+        except (InstabilityError, OpenMMException) as error:
+            number = getattr(error, "filament", None)
+            if number is None or shift == _MOST_SHIFTS:
+                raise InputError(
+                    f"[contacts] filaments that overlap at first have not come apart: {error} Begin with fewer "
+                    "filaments, with a smaller diameter or time_step, or set relax = false."
+                ) from None
+        positions = _shifted(positions, alone.filaments, number, configuration.contacts.diameter, settings.seed, shift)
+    return positions
+
+
+def _shifted(positions, filaments, number, diameter, seed, shift):
+    # A filament whose axis goes through that of another one has no side to which it could be pushed.
+    points = np.array(positions.value_in_unit(unit.nanometer))
+    vector = np.random.default_rng([seed, number, shift]).normal(0.0, _SHIFT * diameter, 3)
+    if filaments[number].planar:
+        vector[2] = 0.0
+    for indices in (filaments.node_indices[number], filaments.control_point_indices[number]):
+        points[indices] += vector
+    return points * unit.nanometer

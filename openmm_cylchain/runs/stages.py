@@ -20,7 +20,7 @@ from .table import UnknownKeyError
 from .tables.stages import STAGE
 
 _MOST_STAGES = 10**5
-_AT_THE_BEGINNING = ("bound", "keep")
+_AT_THE_BEGINNING = ("bound", "bound_at", "keep")
 _DURATION = ("simulation", "duration")
 
 

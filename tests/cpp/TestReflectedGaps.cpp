@@ -12,6 +12,8 @@
 #include <algorithm>
 #include <memory>
 #include <numeric>
+#include <random>
+#include <set>
 
 /** A plane at a distance from the origin, which particles are before, along the normal. */
 struct Plane {
@@ -353,6 +355,58 @@ static void testOverlaps() {
     }
 }
 
+/** Colors of gaps between chains at random, of which one has more than a word of colors holds. */
+static void testColors() {
+    mt19937 generator(1);
+    const int numChains = 300;
+    vector<Gap> gaps(3000);
+    for (size_t i = 0; i < gaps.size(); i++) {
+        gaps[i].numLevers = 1;
+        const int one = i%30 == 0 ? 7 : generator()%numChains, other = generator()%numChains;
+        // A wall, which does not move; two places on one chain.
+        gaps[i].levers[0].places[0].pack = gaps[i].levers[0].places[1].pack = 0;
+        gaps[i].levers[0].places[0].chain = one;
+        gaps[i].levers[0].places[1].chain = i%50 == 1 ? one : other;
+        if (i%40 == 1)
+            gaps[i].levers[0].places[1] = PlaceOnChain();
+    }
+    GapResponses responses;
+    responses.begin(numChains);
+    responses.addPorts(gaps);
+    GapColors colors, some;
+    colors.sort(gaps.size(), responses);
+    // What threads do at the same time is done here against the order: chains are then touched once in each call.
+    vector<int> visits(gaps.size()), order;
+    int calls = 0;
+    const Loop loop = [&] (int count, const function<void(int)>& iteration) {
+        calls++;
+        set<int> touched;
+        const size_t before = order.size();
+        for (int i = count-1; i >= 0; i--)
+            iteration(i);
+        for (size_t k = before; k < order.size(); k++) {
+            set<int> own;
+            for (int side = 0; side < 2; side++)
+                if (gaps[order[k]].packOf(side) >= 0)
+                    own.insert(gaps[order[k]].chainOf(side));
+            for (int chain : own)
+                check(touched.insert(chain).second, "two gaps of a color share a chain");
+        }
+    };
+    const auto visit = [&] (int gap) {
+        visits[gap]++;
+        order.push_back(gap);
+        return (double) gap;
+    };
+    check(colors.visit(false, loop, visit) == gaps.size()-1.0, "the largest number is another one");
+    check(calls > 5, "threads have nothing to do");
+    check(count(visits.begin(), visits.end(), 1) == (int) gaps.size(), "a gap is not visited, or twice");
+    some.select(colors, [] (int gap) {return gap%3 == 0;});
+    order.clear();
+    check(some.visit(true, loop, visit) == 2997 && order.size() == 1000, "others are visited");
+}
+
 int main() {
-    return runTests({testHardSurfaces, testOneGap, testSprings, testTwoGaps, testTwelveGaps, testCold, testOverlaps});
+    return runTests({testHardSurfaces, testOneGap, testSprings, testTwoGaps, testTwelveGaps, testCold, testOverlaps,
+            testColors});
 }

@@ -228,7 +228,6 @@ def test_singles_have_bases_on_bodies(tmp_path):
         ("new core { point1 = center, 0 }\nnew tube { length = 1 }\n", "bodies: solids without a radius"),
         ("new core { point1 = center, 1; position = somewhere 1 }\nnew tube { length = 1 }\n", "positions: somewhere"),
         ("new core { point1 = center, 1, nothing }\nnew tube { length = 1 }\n", "bodies: what is attached to them"),
-        ("new core { point1 = 3, sphere 1 if (X > 0), 1 }\nnew tube { length = 1 }\n", "positions: if"),
         (
             "new star { solid = core9; radius = 0.5; fibers = 3, tube }\nnew tube { length = 1 }\n",
             "bodies: asters on a",

@@ -39,18 +39,18 @@ def test_values_of_settings(text, expected):
 
 def test_commands_have_their_words_blocks_and_lines():
     text = (
-        "% a comment { that opens nothing\n"
+        "/** a file of 2017 { begins\n so */ % a comment { that opens nothing\n"
         "set fiber actin\n{\n a = 1 % no } here\n}\n"
         "%{ a long\n comment { with } brackets\n}\n"
         "new 10 actin ( 1 2 3 )\nnew [2 * volume] actin { b = (c;) }; run 100 system\nrun 5 system { x = 1 }"
     )
     found = [(own.verb, own.words, own.line) for own in read_commands(text)]
     assert found == [
-        ("set", ("fiber", "actin"), 2),
-        ("new", ("10", "actin"), 9),
-        ("new", ("[2 * volume]", "actin"), 10),
-        ("run", ("100", "system"), 10),
-        ("run", ("5", "system"), 11),
+        ("set", ("fiber", "actin"), 3),
+        ("new", ("10", "actin"), 10),
+        ("new", ("[2 * volume]", "actin"), 11),
+        ("run", ("100", "system"), 11),
+        ("run", ("5", "system"), 12),
     ]
     first, second, *_ = read_commands(text)
     assert pairs(first.block.text) == [("a", ["1"])]

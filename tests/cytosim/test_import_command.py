@@ -162,6 +162,48 @@ def test_values_of_templates_are_taken_from_the_command_line(tmp_path, capsys):
     assert "--value must be a name and a value" in capsys.readouterr().err
 
 
+STAGED = """
+set simul system { time_step = 0.001; viscosity = 0.1; kT = 0.0042; dim = 3 }
+set space cell { shape = sphere }
+set fiber tube { rigidity = 20; segmentation = 0.5; confine = inside, 100 }
+set hand dynein { binding = 10, 0.05; unbinding = 1, 3; activity = move; unloaded_speed = -1; stall_force = 5 }
+set single motor { hand = dynein; stiffness = 100 }
+set couple bridge { hand1 = dynein; hand2 = dynein; stiffness = 100; diffusion = 1 }
+set solid core { confine = inside, 100 }
+set aster star { stiffness = 1000, 500 }
+new cell { radius = 3 }
+new 2 star { solid = core; radius = 0.6, 0.2; point1 = center, 0.6; fibers = 6, tube, ( length = 1; ) }
+new 2 core { sphere1 = 0 0 0, 0.5, 4 motor; point1 = 0.5 0 0, 0, motor; single1 = motor, point1, sphere1, 0.5 }
+new 20 bridge
+run 100 system { nb_frames = 2 }
+change dynein { unloaded_speed = 0 }
+delete 5 bridge
+run 100 system { nb_frames = 2 }
+change cell { radius = 2.5 }
+new 2 tube { length = 1 }
+run 100 system { nb_frames = 2 }
+"""
+
+PLACED = """/* of 2017 */
+set simul system { time_step = 0.001; viscosity = 0.1; dim = 3 }
+set space cell { shape = ellipse }
+new cell { diameter = 4, 5, 6 }
+set fiber tube { rigidity = 20; segmentation = 0.5; activity = classic; growing_speed = 0.1; shrinking_speed = -0.2;
+ catastrophe_rate = 0.01; confine = inside, 100 }
+set fiber rod { rigidity = 20; segmentation = 0.5 }
+set hand binder { binding = 5, 0.05; unbinding = 1, 3 }
+set single pin { hand = binder; activity = fixed; stiffness = 100 }
+set couple bridge { hand1 = binder; hand2 = binder; stiffness = 100; diffusion = 1 }
+new rod { length = 2; shape = curved, 3, 0 0 1; position = 0 0 0; orientation = off, axis 0 0 1 degree 90 }
+new 2 rod { length = 1; direction = X blur 0.1 or 0 1 0; position = ball 1 if (X > 0); attach1 = bridge, 0.2, plus_end }
+new 2 tube { length = 1; plus_end = grow; rotation = X 0.5; position = cap 2 1 turn quat 1 0 0 0 }
+new 3 bridge { attach1 = rod1, 0.5 }
+new 2 pin { position = 0 1 0; attach = tube1, 0.5 }
+new event { rate = 2; code = ( new tube { length = 0.05; plus_end = grow; direction = X; position = cylinder 2 0 } ) }
+new event { delay = 0.1; code = ( new rod { length = 0.5 } ) }
+run 100 system { nb_frames = 2 }
+"""
+
 PIECES = (
     "{",
     "}",
@@ -188,8 +230,8 @@ PIECES = (
 
 def mutated(generator):
     """One of the texts with some of its pieces changed, and words of others in their place."""
-    text = (NETWORK, GROWING, SHAPES)[generator.integers(3)]
-    words = re.split(r"(\s+)", NETWORK + GROWING + SHAPES)
+    text = (NETWORK, GROWING, SHAPES, STAGED, PLACED)[generator.integers(5)]
+    words = re.split(r"(\s+)", NETWORK + GROWING + SHAPES + STAGED + PLACED)
     parts = re.split(r"(\W)", text)
     for _ in range(generator.integers(1, 5)):
         at = generator.integers(len(parts))
@@ -222,6 +264,16 @@ def outcomes(tmp_path, seed, count):
             print(text)
             raise
     return refused
+
+
+@pytest.mark.parametrize(
+    ("text", "tables"), [(STAGED, ("[[body]]", "[[stage]]")), (PLACED, ("[[nucleation]]", "bound_at"))]
+)
+def test_without_changes_all_is_written(tmp_path, text, tables):
+    (tmp_path / "my.cym").write_text(text)
+    import_file(tmp_path / "my.cym", tmp_path / "my.toml")
+    found = (tmp_path / "my.toml").read_text()
+    assert all(table in found for table in tables)
 
 
 def test_files_that_are_changed_by_chance_are_refused_in_words_or_written(tmp_path):

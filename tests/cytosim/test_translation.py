@@ -7,7 +7,8 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain.cytosim.command import check
-from openmm_cylchain.cytosim.places import Draw, draw_direction, draw_inside, draw_position
+from openmm_cylchain.cytosim.drawing import Draw
+from openmm_cylchain.cytosim.places import draw_position
 from openmm_cylchain.cytosim.settings import Settings
 from openmm_cylchain.cytosim.spaces import make_space
 from openmm_cylchain.cytosim.translation import translate
@@ -724,83 +725,6 @@ def test_volumes_of_spaces_are_those_of_what_is_inside(shape, sizes, dimensions)
     assert error < 0.01 * space.volume
     drawn = np.array([space.draw(generator) for _ in range(200)])
     assert np.all(space.inside(drawn))
-
-
-def draw_of(dimensions, space=None):
-    return Draw(space, dimensions, np.random.default_rng(5), 1)
-
-
-@pytest.mark.parametrize(
-    ("text", "dimensions", "expected"),
-    [
-        # Mean and variance along each axis.
-        ("1 2 3", 3, [(1, 0), (2, 0), (3, 0)]),
-        ("ball 2", 3, [(0, 4 / 5)] * 3),
-        ("ball 2 at 1 0 0", 2, [(1, 1), (0, 1), (0, 0)]),
-        ("disc 2 0.6", 3, [(0, 1), (0, 1), (0, 0.36 / 12)]),
-        ("discYZ 2 0.6", 3, [(0, 0.36 / 12), (0, 1), (0, 1)]),
-        ("rectangle 2 1 0.5", 3, [(0, 4 / 12), (0, 1 / 12), (0, 0.25 / 12)]),
-        ("sphere 2", 3, [(0, 4 / 3)] * 3),
-        ("circle 2", 2, [(0, 2), (0, 2), (0, 0)]),
-        ("cylinder 4 2", 3, [(0, 16 / 12), (0, 1), (0, 1)]),
-        ("ring 4 2", 3, [(0, 16 / 12), (0, 2), (0, 2)]),
-        ("equator 2 1", 3, [(0, 2), (0, 2), (0, 1 / 12)]),
-        ("line 4 0", 3, [(0, 16 / 12), (0, 0), (0, 0)]),
-        ("square 2", 2, [(0, 4 / 12), (0, 4 / 12), (0, 0)]),
-        ("0 0 0 to 2 0 0", 3, [(1, 4 / 12), (0, 0), (0, 0)]),
-        ("1 0 0 or -1 0 0", 3, [(0, 1), (0, 0), (0, 0)]),
-        ("1 0 0 blur 0.5", 2, [(1, 0.25), (0, 0.25), (0, 0)]),
-        ("2 0 0 turn degree 90", 3, [(0, 0), (2, 0), (0, 0)]),
-        ("line 2 0 align 0 1 0", 2, [(0, 0), (0, 4 / 12), (0, 0)]),
-        ("center add ball 2", 3, [(0, 4 / 5)] * 3),
-    ],
-)
-def test_positions_have_the_means_and_variances_of_their_shapes(text, dimensions, expected):
-    draw, count = draw_of(dimensions), 4000
-    places = np.array([draw_position(text, draw) for _ in range(count)])
-    for values, (mean, variance) in zip(places.T, expected):
-        deviations = (values - mean) ** 2
-        assert abs(np.mean(values) - mean) <= 4 * math.sqrt(variance / count) + 1e-9
-        error = np.std(deviations) / math.sqrt(count)
-        assert abs(np.mean(deviations) - variance) <= 4 * error + 1e-9
-        assert error <= 0.05 * variance + 1e-9
-
-
-def test_positions_in_spaces():
-    settings = Settings("space", 1)
-    settings.set("radius", ["3"], 1)
-    draw = draw_of(3, make_space("sphere", [settings], 3))
-    flat = np.array([draw_inside("XY 1", draw) for _ in range(200)])
-    assert np.all(flat[:, 2] == 1.0) and np.all(np.linalg.norm(flat, axis=1) <= 3)
-    rising = np.array([draw_inside("gradient -3 3", draw)[0] for _ in range(2000)])
-    # Of the density (x + 3)(9 - x^2): its mean is the ratio of the integrals of x^2 (9 - x^2) and of 3 (9 - x^2).
-    assert abs(rising.mean() - 0.6) < 4 * rising.std() / math.sqrt(len(rising))
-    assert draw_inside("rectangle 0.1 0.1 0.1 at 9 0 0", draw) is None
-
-
-@pytest.mark.parametrize(
-    ("text", "of"),
-    [
-        ("X", lambda v, at: abs(v[0] - 1)),
-        ("0 2 0", lambda v, at: abs(v[1] - 1)),
-        ("horizontal", lambda v, at: abs(abs(v[0]) - 1)),
-        ("parallel 0 1 0", lambda v, at: abs(abs(v[1]) - 1)),
-        ("orthogonal 0 0 1", lambda v, at: abs(v[2])),
-        ("parallel XY", lambda v, at: abs(v[2])),
-        ("radial", lambda v, at: abs(v @ at / np.linalg.norm(at) - 1)),
-        ("antiradial", lambda v, at: abs(v @ at / np.linalg.norm(at) + 1)),
-        ("circular", lambda v, at: abs(v @ at)),
-        ("1 0 0 or 0 1 0", lambda v, at: abs(v[0] + v[1] - 1)),
-        (None, lambda v, at: 0.0),
-    ],
-)
-def test_directions(text, of):
-    draw, at = draw_of(3), np.array([1.0, 2.0, 0.5])
-    vectors = np.array([draw_direction(text, at, draw) for _ in range(500)])
-    assert np.allclose(np.linalg.norm(vectors, axis=1), 1.0)
-    assert max(of(vector, at) for vector in vectors) < 1e-9
-    if text is None:
-        assert np.allclose(vectors.mean(axis=0), 0.0, atol=4 / math.sqrt(3 * 500))
 
 
 def test_unknown_places_and_directions_are_said(tmp_path):

@@ -56,15 +56,14 @@ def test_a_run_of_joints_too_stiff_for_a_grid_of_angles_has_its_figure(tmp_path)
 
 
 def test_a_box_too_narrow_for_contacts_is_not_the_fault_of_a_platform():
-    large = PARTICLES.replace("150 nm", "250 nm").replace("count = 2", "count = 1")
     message = r"^This cannot be simulated: The periodic box is too small for contacts in implicit steps: it is 800 nm"
-    wide = BOX.replace("600", "800")
+    wide, thick = BOX.replace("600", "800"), CONTACTS.replace("10 nm", "200 nm")
     for platform in ("Reference", "CPU"):
         simulation = f'{SIMULATION}platform = "{platform}"\n'
         for call in (create_simulation, check_step):
             for relax in ("true", "false"):
                 with pytest.raises(InputError, match=message):
-                    call(parsed(wide, large, f"{CONTACTS}relax = {relax}\n", simulation=simulation))
+                    call(parsed(wide, f"{thick}relax = {relax}\n", simulation=simulation))
 
 
 def test_particles_run_beside_beams_with_contacts():

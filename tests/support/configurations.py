@@ -270,6 +270,7 @@ segment_length = "108 nm"
 persistence_length = "9 um"
 stretching_modulus = "20 nN"
 growth = { monomers = "own", longest = "1 um", vanishes = true }
+planar = true
 count = 10
 total_rate = "50 1/s"
 order = 2

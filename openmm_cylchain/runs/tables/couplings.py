@@ -101,16 +101,14 @@ WALL = TableKind(
 # Of the diameter of filaments. Steps would have to be divided again and again to resolve contacts of less.
 _LEAST_DIAMETER = 0.1
 
-_NUMBERS = Either(
+NUMBERS = Either(
     (
         (list, Listing(Whole(0, None, "0"), "numbers of filaments", "[0, 1]")),
         (object, Whole(0, None, "0")),
     )
 )
 _WHICH = (
-    Key(
-        "filament", _NUMBERS, None, "Number of a filament, or a list of them, counted from 0 in the order of the file."
-    ),
+    Key("filament", NUMBERS, None, "Number of a filament, or a list of them, counted from 0 in the order of the file."),
     Key("table", Whole(1, None, "1"), None, "Number of a [[filament]] table, counted from 1: all of its filaments."),
 )
 

@@ -17,7 +17,7 @@ from ...kinetics.presets import PRESETS
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Flag, Inline, Key, Listing, Number, Pair, Quantity, Text, Whole, as_written, point
 from ..table import Entries, TableKind
-from .couplings import volume_of_walls
+from .couplings import NUMBERS, volume_of_walls
 from .filament_types import TypeNames
 from .nucleation import has_places
 from .shapes import REGION, REGION_EXAMPLE, Region
@@ -159,6 +159,16 @@ _ANCHOR_REGION = TableKind(
     ),
     "Anchors at random places, in a box or on a wall, or points of bodies.",
 )
+_BOUND_AT = TableKind(
+    "bound_at",
+    (
+        Key("filament", NUMBERS, REQUIRED, "Number of a filament, or a list of them."),
+        Key("arc_length", Quantity(units.LENGTH, "zero"), REQUIRED, "Distance from the first node along it."),
+    ),
+    "Where a hand is bound as a run begins.",
+    owner="bound_at of [[linkers]]",
+)
+_BOUND_AT_EXAMPLE = '[{ filament = 0, arc_length = "1 um" }]'
 LINKERS = TableKind(
     "linkers",
     (
@@ -212,6 +222,12 @@ LINKERS = TableKind(
         Key("anchors", _Anchors(), None, "Points to which they are tied, one each, in place of their first hands."),
         Key("bound", Whole(0, 10**7, "100"), 0, "How many begin with one hand bound, at random or near anchors."),
         Key(
+            "bound_at",
+            Listing(Inline(_BOUND_AT), "places on filaments", _BOUND_AT_EXAMPLE),
+            None,
+            "In place of bound: where they are, one linker each; those with anchors are tied to the first of these.",
+        ),
+        Key(
             "keep",
             Choice(KEPT),
             "all",
@@ -244,6 +260,7 @@ class LinkerGroup:
     region: tuple | None
     keep: str = "all"
     body_anchors: tuple | None = None
+    bound_at: tuple | None = None
 
 
 def read_linkers(entries, groups, box, seed, walls=(), bodies=()):
@@ -256,7 +273,16 @@ def read_linkers(entries, groups, box, seed, walls=(), bodies=()):
         anchors = (0,) * (bodies[table - 1].count * len(points))
     first, last = (tuple(entries[name] for name in names) for names in (_BEFORE_ANCHORS, _BEHIND_ANCHORS))
     region = None if entries["inside"] is None else Region(entries["inside"]).walls
-    group = LinkerGroup(_kind(entries), *first, anchors, *last, region, entries["keep"], on_bodies)
+    places = None
+    if entries["bound_at"] is not None:
+        entries.refuse(("bound",), "cannot be with bound_at, which says how many.")
+        places = tuple(
+            (number, own["arc_length"])
+            for own in entries["bound_at"]
+            for number in np.atleast_1d(own["filament"]).tolist()
+        )
+        last = (len(places), *last[1:])
+    group = LinkerGroup(_kind(entries), *first, anchors, *last, region, entries["keep"], on_bodies, places)
     with entries.naming():
         as_linkers(group.kind, *first, group.anchors, group.bound, 0, group.diffusion, group.planar, region)
     if group.diffusion is not None:

@@ -6,7 +6,7 @@ from ...couplings.shapes import Box, Sphere
 from ...kinetics.branching import Branching
 from ...kinetics.nucleation import Nucleation
 from ...units import quantities as units
-from ..keys import REQUIRED, Inline, Key, Listing, Quantity, Whole, direction
+from ..keys import REQUIRED, Flag, Inline, Key, Listing, Quantity, Whole, direction
 from ..table import TableKind
 from .filament import MOST_NODES, reserve_group
 from .filament_types import TYPE_KEYS, read_filament_type
@@ -39,6 +39,7 @@ _OF_NEW_ONES = (
 _OWN_TYPE = (
     Key("growth", Inline(GROWTH, GROWTH_EXAMPLE), None, "Without a table: as of [[filament]]."),
     Key("propulsion", Quantity(units.FORCE, "any"), None, "Without a table: as of [[filament]]."),
+    Key("planar", Flag(), None, "Without a table: whether each moves in a plane of constant z."),
     *(dataclasses.replace(key, text=f"Without a table. {key.text}") for key in TYPE_KEYS),
 )
 _BORROWED = tuple(key.name for key in _OWN_TYPE)
@@ -161,6 +162,9 @@ def _group(entries, groups, solvent, monomers, nucleation):
     kind, growth, others = _which(entries, groups, solvent, monomers)
     if nucleation.length is not None and nucleation.length > growth.longest:
         raise entries.at("length").error(f"must not exceed the longest of its growth, {growth.longest:g} nm.")
+    direction = getattr(nucleation, "direction", None)
+    if others["planar"] and direction is not None and direction[2] != 0.0:
+        raise entries.at("direction").error("must lie in the xy plane, because these filaments are planar.")
     path = entries.place.path
     return reserve_group(entries, kind, growth, entries["count"], nucleation=nucleation, own_path=path, **others)
 
@@ -172,7 +176,8 @@ def _which(entries, groups, solvent, monomers):
             raise entries.error("does not say which filaments begin: add table = 1, or a type and its growth.")
         kind = read_filament_type(entries, solvent)
         entries.require("growth")
-        return kind, read_growth(entries["growth"], monomers), {"propulsion": entries["propulsion"] or 0.0, "table": 0}
+        own = {"propulsion": entries["propulsion"] or 0.0, "planar": bool(entries["planar"]), "table": 0}
+        return kind, read_growth(entries["growth"], monomers), own
     entries.refuse(_BORROWED, "is that of the table whose number is given: leave one of them out.")
     found = [group for group in groups if group.path == ("filament", entries["table"] - 1)]
     if not found:

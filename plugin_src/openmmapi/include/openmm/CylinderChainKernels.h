@@ -245,7 +245,7 @@ public:
     virtual void initialize(const cylchain::LinkerSystem& system, const cylchain::ChainList& chains, bool periodic,
             bool nearestParticles) = 0;
     /**
-     * Take note that chains have grown or shrunk: see cylchain::LinkerKinetics::setChains(). Random numbers are those
+     * Take note that chains have grown or shrunk: see cylchain::LinkerKinetics::setChains().  Random numbers are those
      * of execute().
      */
     virtual bool setChains(ContextImpl& context, const cylchain::ChainList& chains,

@@ -5,7 +5,7 @@
 /** What random numbers of particles are for: see lanes/Noise.h. */
 enum {NOISE_PARTICLE = 4};
 
-/** Where a particle that the processor sees is in the arrays of OpenMM, and by how many box vectors it is wrapped. */
+/** Where a particle that the processor sees is in the arrays of OpenMM, and by how many vectors of the box. */
 enum {IMAGE_SLOT = 0, IMAGE_CELLS = 1, NUM_IMAGE_NUMBERS = 4};
 
 /** Numbers of such a particle: to the processor its position and the force on it, back a position and a velocity. */

@@ -21,8 +21,8 @@ struct ReferenceCalcCylinderChainContactForceKernel::Touching {
 
 ReferenceCalcCylinderChainContactForceKernel::ReferenceCalcCylinderChainContactForceKernel(string name,
         const Platform& platform, shared_ptr<HostParticles> particles) :
-        CalcCylinderChainContactForceKernel(name, platform), host(particles), search(NULL), stiffness(0),
-        skin(0), periodic(false), hasList(false), noted(NULL) {
+        CalcCylinderChainContactForceKernel(name, platform), host(particles), search(NULL), stiffness(0), skin(0),
+        periodic(false), hasList(false), noted(NULL) {
 }
 
 void ReferenceCalcCylinderChainContactForceKernel::initialize(const System&, ContactSearch& search, double stiffness,

@@ -6,8 +6,8 @@ using namespace cylchain;
 using namespace std;
 
 ReferenceCalcCylinderChainForceKernel::ReferenceCalcCylinderChainForceKernel(string name, const Platform& platform,
-        shared_ptr<HostParticles> particles) :
-        CalcCylinderChainForceKernel(name, platform), particles(particles), chains(NULL) {
+        shared_ptr<HostParticles> particles) : CalcCylinderChainForceKernel(name, platform), particles(particles),
+        chains(NULL) {
 }
 
 void ReferenceCalcCylinderChainForceKernel::initialize(const System&, const CylinderChainDescription& chains) {

@@ -20,8 +20,8 @@ static bool isFinite(const Vec3& v) {
 
 ReferenceIntegrateCylinderChainStepKernel::ReferenceIntegrateCylinderChainStepKernel(string name,
         const Platform& platform, shared_ptr<HostParticles> particles) :
-        IntegrateCylinderChainStepKernel(name, platform), particles(particles), chainKernel(NULL), others(NULL),
-        versionOfNetwork(-1), versionOfLengths(-1), mixedChains(0) {
+        IntegrateCylinderChainStepKernel(name, platform), particles(particles), chainKernel(NULL),
+        others(NULL), versionOfNetwork(-1), versionOfLengths(-1), mixedChains(0) {
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system, const CylinderChainDescription&,

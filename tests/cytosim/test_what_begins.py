@@ -1,0 +1,170 @@
+"""What begins during runs of Cytosim, or begins bound, and the first steps of what is written."""
+
+import math
+
+import numpy as np
+import pytest
+
+from openmm_cylchain.cytosim.command import import_file
+from openmm_cylchain.cytosim.translation import translate
+from openmm_cylchain.runs.configuration import read_configuration
+from openmm_cylchain.runs.created_simulation import begin, create_simulation
+from support.cytosim_files import RUN, SECOND, SYSTEM, TUBE, translated
+
+# Steps are those of Cytosim, which resolve less.
+pytestmark = pytest.mark.filterwarnings("ignore::openmm_cylchain.TimeStepWarning")
+
+FLAT = SYSTEM.replace("dim = 3", "dim = 2")
+DISC = "set space cell { shape = circle }\nnew cell { radius = 2 }\n"
+GROWING = "set fiber tube { rigidity = 20; activity = grow; growing_speed = 0.01; confine = inside, 1000 }\n"
+
+
+def event(settings, rate=3.0):
+    """A command that begins fibers."""
+    return f"new event {{ rate = {rate}; code = ( new tube {{ length = 0.1; plus_end = grow; {settings} }} ) }}\n"
+
+
+@pytest.mark.parametrize(
+    ("place", "lower", "upper"),
+    [
+        ("position = 1 2 3", (1000, 2000, 3000), (1000, 2000, 3000)),
+        ("position = rectangle 2 4", (-1000, -2000, 0), (1000, 2000, 0)),
+        ("position = (cylinder 3 0)", (-1500, 0, 0), (1500, 0, 0)),
+        ("position = line 3 at 0 1 0", (-1500, 1000, 0), (1500, 1000, 0)),
+        ("position = center", (0, 0, 0), (0, 0, 0)),
+    ],
+)
+def test_events_are_at_points_and_in_thin_regions(tmp_path, place, lower, upper):
+    found, document = translated(tmp_path, GROWING + event(place))
+    region = found.filaments[0].nucleation.region
+    np.testing.assert_allclose([region.lower, region.upper], [lower, upper], atol=2e-3)
+    assert np.all(region.lower < region.upper)
+    assert document.missing == []
+
+
+def test_half_of_those_with_the_direction_of_a_letter_have_the_opposite_one(tmp_path):
+    found, document = translated(tmp_path, GROWING + event("position = ball 1; direction = X"))
+    first, second = (group.nucleation for group in found.filaments)
+    assert first.rate == second.rate == pytest.approx(1.5 / SECOND)
+    np.testing.assert_array_equal([first.direction, second.direction], [[1, 0, 0], [-1, 0, 0]])
+    assert document.missing == []
+
+
+def test_fibers_that_do_not_grow_begin_too(tmp_path):
+    text = TUBE + event("position = ball 1").replace("plus_end = grow;", "")
+    found, document = translated(tmp_path, text)
+    (group,) = found.filaments
+    assert group.is_reserve and group.growth.plus_capped and group.growth.minus_capped
+    assert document.missing == []
+
+
+def test_as_many_begin_in_a_disc_as_the_rate_says(tmp_path):
+    # Anywhere in a circle, whose walls keep out those of the square around it.
+    rate, seconds = 8000.0, 0.05
+    text = GROWING + event("", rate)
+    found, document = translated(tmp_path, text, FLAT, DISC, "run 50 system\n")
+    assert document.missing == []
+    simulation, built = create_simulation(found)
+    begin(found, simulation, built)
+    simulation.step(50)
+    state = built.filaments.in_context(simulation.context).growth()
+    count = int(np.sum(state.nodes > 0))
+    expected = rate * seconds
+    # A hundredth of them begin partly outside, within the softness of the wall.
+    assert abs(count - expected) < 4 * math.sqrt(expected) + 0.01 * expected
+    positions = simulation.context.getState(positions=True).getPositions(asNumpy=True)._value
+    there = [nodes[0] for nodes, present in zip(built.filaments.node_indices, state.nodes > 0) if present]
+    first = positions[there]
+    assert np.all(np.abs(first[:, 2]) < 2e-3)
+    # Evenly in the disc: the mean square of the distance from its middle is half of that of its radius.
+    squares = np.sum(first[:, :2] ** 2, axis=1) / 2000.0**2
+    assert abs(squares.mean() - 0.5) < 4 * math.sqrt(1.0 / 12.0 / count) + 0.02
+
+
+COUPLE = "set hand binder { binding = 5, 0.05; unbinding = 1, 3 }\n"
+COUPLE += "set couple bridge { hand1 = binder; hand2 = binder; stiffness = 100; diffusion = 1 }\n"
+COUPLE += "set single pin { hand = binder; activity = fixed; stiffness = 100 }\n"
+
+
+def test_hands_begin_where_they_are_attached(tmp_path):
+    text = TUBE + COUPLE + "new 2 tube { length = 2; attach1 = bridge, 0.5; attach2 = bridge, 0.5, plus_end }\n"
+    text += "new 3 bridge\nnew bridge { attach1 = tube2, 0.2, center }\n"
+    text += "new 2 pin { position = 0 1 0 }\nnew pin { position = 0 2 0; attach = tube1, 0.25 }\n"
+    found, document = translated(tmp_path, text)
+    couples, pins = found.linkers
+    assert couples.count == 8 and couples.bound == 5
+    assert couples.bound_at == ((0, 500.0), (1, 500.0), (0, 1500.0), (1, 1500.0), (1, 1200.0))
+    assert pins.bound_at == ((0, 250.0),)
+    np.testing.assert_allclose(pins.anchors, [[0, 2000, 0], [0, 1000, 0], [0, 1000, 0]])
+    assert document.missing == []
+    simulation, built = create_simulation(found)
+    begin(found, simulation, built)
+    table = built.filaments.in_context(simulation.context).linkers()
+    bound = [(int(own), at) for own, at in zip(table.filaments[:8, 0], table.arc_lengths[:8, 0]) if own >= 0]
+    np.testing.assert_allclose(bound, couples.bound_at)
+    assert table.filaments[8:, 1].tolist() == [0, -1, -1]
+
+
+NUCLEATOR = """set hand maker { unbinding = 0, 3; activity = nucleate;
+ nucleate = 40, tube, ( length = 0.2; plus_end = grow ) }
+set single seed { hand = maker; activity = fixed; stiffness = 1000 }
+new 20 seed { position = ball 3 }
+"""
+
+
+def test_nucleators_make_one_fiber_each_and_hold_it(tmp_path):
+    found, document = translated(tmp_path, GROWING + NUCLEATOR, run="run 100 system\n")
+    assert document.missing == []
+    assert [group.count for group in found.filaments] == [1] * 20
+    simulation, built = create_simulation(found)
+    begin(found, simulation, built)
+    there = []
+    for _ in range(4):
+        simulation.step(15)
+        growth = built.filaments.in_context(simulation.context).growth()
+        there.append(int(np.sum(growth.nodes > 0)))
+    # Each at its own rate: after a time t, a share of 1 - exp(-rate t) has one.
+    expected = 20 * (1.0 - np.exp(-40 * 0.015 * np.arange(1, 5)))
+    assert np.all(np.abs(there - expected) < 4 * np.sqrt(20 * 0.25))
+    table = built.filaments.in_context(simulation.context).linkers()
+    bound = np.flatnonzero(table.filaments[:, 1] >= 0)
+    assert len(bound) >= there[-1] - 1
+    positions = simulation.context.getState(positions=True).getPositions(asNumpy=True)._value
+    for number in bound:
+        first = positions[built.filaments.node_indices[table.filaments[number, 1]][0]]
+        assert np.linalg.norm(first - found.linkers[0].anchors[number]) < 20.0
+        assert table.arc_lengths[number, 1] < 10.0
+
+
+def test_steps_are_shorter_where_the_first_ones_have_no_solution(tmp_path):
+    # An aster outside of its cell, whose walls push it in.
+    text = "set fiber tube { rigidity = 30; segmentation = 1; confine = inside, 100 }\nset solid core { }\n"
+    text += "set aster star { stiffness = 1000, 500 }\n"
+    text += "new star { solid = core; radius = 0.5; point1 = center, 0.5; fibers = 2, tube, ( length = 1 ); "
+    text += "type = custom; fiber1 = 0 0 0, 0 1 0; fiber2 = 0 0 0, 0 -1 0; position = -5 0 0; direction = 1 0 0 }\n"
+    system = "set simul system { time_step = 0.005; viscosity = 0.01; kT = 0.0042; dim = 3 }\n"
+    path = tmp_path / "my.cym"
+    cell = "set space cell { shape = sphere }\nnew cell { radius = 5 }\n"
+    path.write_text(system + cell + text + RUN)
+    steps = {}
+    for trial in (False, True):
+        output = tmp_path / f"{trial}.toml"
+        import_file(path, output, trial=trial)
+        found = read_configuration(output)
+        steps[trial] = found.simulation.time_step
+        assert found.simulation.steps * found.simulation.time_step == pytest.approx(5 * SECOND)
+    assert steps[False] == 5e9
+    assert steps[True] < 5e9
+    assert "0.005 s in Cytosim, in which the first steps have no solution" in (tmp_path / "True.toml").read_text()
+    simulation, built = create_simulation(found)
+    begin(found, simulation, built)
+    simulation.step(100)
+
+
+def test_spaces_that_deform_keep_their_shapes_and_say_so(tmp_path):
+    cell = "set space cell { shape = dynamic_ellipse; tension = 1 }\nnew cell { length = 5, 5, 4 }\n"
+    path = tmp_path / "my.cym"
+    path.write_text(SYSTEM + cell + TUBE + "new 3 tube { length = 1 }\n" + RUN)
+    document = translate(path, "my").document
+    assert document.missing == ["spaces: dynamic_ellipse"]
+    assert document.tables_called("[[filament]]")[0].value("inside")["shape"] == "ellipsoid"

@@ -1,0 +1,119 @@
+"""Filaments that begin in planes, hands that begin bound at places, and filaments that have to be shifted."""
+
+import numpy as np
+import pytest
+
+from openmm_cylchain.errors import InputError, InstabilityError
+from openmm_cylchain.runs.configuration import parse_configuration
+from openmm_cylchain.runs.created_simulation import begin, create_simulation
+from openmm_cylchain.runs.initial_state import build_system
+from openmm_cylchain.runs.keys import ConfigurationError
+from openmm_cylchain.runs.relaxation import relaxed_positions
+from openmm_cylchain.systems.filaments import Filaments
+
+HEAD = '[solvent]\ntemperature = "298 K"\nviscosity = "10 mPa*s"\n'
+TAIL = '[simulation]\ntime_step = "20 us"\nduration = "20 ms"\nreport_interval = "10 ms"\nplatform = "Reference"\n'
+FILAMENTS = (
+    '[[filament]]\ntype = "MICROTUBULE"\nsegment_length = "500 nm"\nsegments = 2\ncount = 3\nstart = "straight"\n'
+)
+LINKERS = (
+    '[[linkers]]\nname = "own"\ncount = 6\nvolume = "1 um^3"\nstiffness = "0.1 pN/nm"\nrest_length = "40 nm"\n'
+    'hand = { binding_rate = "1 1/s", reach = "50 nm", unbinding_rate = "0 1/s" }\n'
+    'bound_at = [{ filament = [0, 2], arc_length = "1 um" }, { filament = 1, arc_length = "250 nm" }]\n'
+)
+NUCLEATION = (
+    '[[monomers]]\nname = "own"\nlength = "4 nm"\nplus_on_rate = "1 1/(uM*s)"\nconcentration = "1 uM"\n'
+    '[[nucleation]]\nname = "MINE"\ndiameter = "7 nm"\nsegment_length = "100 nm"\npersistence_length = "2 um"\n'
+    'stretching_modulus = "20 nN"\ngrowth = { monomers = "own", longest = "600 nm" }\nlength = "300 nm"\n'
+    'count = 40\ntotal_rate = "4000 1/s"\nplanar = true\n'
+    'inside = { shape = "box", lower = ["-1 um", "-1 um", "-0.2 um"], upper = ["1 um", "1 um", "0.2 um"] }\n'
+)
+pytestmark = pytest.mark.filterwarnings("ignore::openmm_cylchain.TimeStepWarning")
+
+
+def begun(text):
+    """The Simulation and the BuiltSystem of a text."""
+    configuration = parse_configuration(HEAD + text + TAIL)
+    simulation, built = create_simulation(configuration)
+    begin(configuration, simulation, built)
+    return simulation, built
+
+
+def test_hands_are_bound_where_they_are_told():
+    simulation, built = begun(FILAMENTS + LINKERS)
+    table = built.filaments.in_context(simulation.context).linkers()
+    assert table.filaments[:, 0].tolist() == [0, 2, 1, -1, -1, -1]
+    assert np.all(table.filaments[:, 1] == -1)
+    np.testing.assert_allclose(table.arc_lengths[:3, 0], [1000.0, 1000.0, 250.0])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("bound_at", "bound = 2\nbound_at", "bound.*cannot be with bound_at"),
+        ("[0, 2]", "[0, 3]", "filament 3 does not exist"),
+        ('"1 um" }, {', '"2 um" }, {', "beyond the end of filament 0"),
+        ("count = 6", "count = 2", "3 are to begin bound, but there are only 2"),
+    ],
+)
+def test_places_that_are_none_are_refused(old, new, message):
+    text = HEAD + FILAMENTS + LINKERS.replace(old, new) + TAIL
+    with pytest.raises(ConfigurationError, match=message):
+        configuration = parse_configuration(text)
+        build_system(configuration, configuration.simulation.engine, 1)
+
+
+def test_filaments_begin_and_stay_in_planes():
+    simulation, built = begun(NUCLEATION)
+    simulation.step(500)
+    positions = simulation.context.getState(positions=True).getPositions(asNumpy=True)._value
+    growth = built.filaments.in_context(simulation.context).growth()
+    there = np.flatnonzero(growth.nodes > 0)
+    assert len(there) > 20
+    shapes = [positions[built.filaments.node_indices[own][: growth.nodes[own]]] for own in there]
+    assert max(float(np.ptp(nodes[:, 2])) for nodes in shapes) < 1e-9
+    assert np.ptp([nodes[0, 2] for nodes in shapes]) > 100.0
+    with pytest.raises(ConfigurationError, match="direction must lie in the xy plane"):
+        parse_configuration(HEAD + NUCLEATION + "direction = [0, 0, 1]\n" + TAIL)
+
+
+@pytest.mark.parametrize("planar", [False, True])
+def test_filaments_that_cannot_come_apart_are_shifted(planar, monkeypatch):
+    flat = "planar = true\n" if planar else ""
+    text = "".join(
+        FILAMENTS.replace("count = 3", f'position = ["0 nm", "{y} nm", "0 nm"]\ndirection = [1, 0, 0]\n{flat}')
+        for y in (0, 30)
+    )
+    contacts = '[contacts]\ndiameter = "40 nm"\nstiffness = "1 pN/nm"\n'
+    configuration = parse_configuration(HEAD + text + contacts + TAIL)
+    built = build_system(configuration, configuration.simulation.engine, configuration.simulation.seed)
+    apart = relaxed_positions(configuration, built)._value
+    begun_at, failures = [], 1
+    make = Filaments.create_integrator
+
+    def failing(*arguments, **options):
+        integrator = make(*arguments, **options)
+        step = integrator.step
+
+        def one(count):
+            if len(begun_at) < failures:
+                begun_at.append(0)
+                raise InstabilityError("Filament 1 has blown up", filament=1, segment=0)
+            step(count)
+
+        integrator.step = one
+        return integrator
+
+    monkeypatch.setattr(Filaments, "create_integrator", failing)
+    shifted = relaxed_positions(configuration, built)._value
+    ends = [positions[own].mean(axis=0) for positions in (apart, shifted) for own in built.filaments.node_indices]
+    # By a tenth of 40 nm along each axis, and what thermal motion does to that.
+    assert 0.1 < np.linalg.norm(ends[3] - ends[1]) < 30.0
+    assert not planar or abs(ends[3][2]) < 1e-9
+    begun_at.clear()
+    np.testing.assert_array_equal(relaxed_positions(configuration, built)._value, shifted)
+    begun_at.clear()
+    failures = 10
+    with pytest.raises(InputError, match="have not come apart"):
+        relaxed_positions(configuration, built)
+    assert len(begun_at) == 4
