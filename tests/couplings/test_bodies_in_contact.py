@@ -319,6 +319,8 @@ def test_what_spheres_without_filaments_need():
         _touching(filaments, system, stiffness=0.5 * STIFFNESS)
     with pytest.raises(InputError, match="no two spheres"):
         capsule_contact_force(filaments, system, particles=[0], particle_diameter=100.0)
+    with pytest.raises(InputError, match="particles contains 3 twice"):
+        capsule_contact_force(filaments, system, particles=[0, 3, 3], particle_diameter=100.0)
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     filaments.add_straight(F_ACTIN, 2, [0, 0, 0], [1, 0, 0])
     _, system, _ = filaments.build()
