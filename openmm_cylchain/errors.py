@@ -69,7 +69,7 @@ class TimeStepError(InstabilityError):
 
 
 class BoxWarning(UserWarning):
-    """Forces between filaments that do not take nearest images, though the System is periodic."""
+    """Forces on filaments that do not take nearest images, though the System is periodic."""
 
 
 class ContactWarning(UserWarning):

@@ -371,6 +371,9 @@ def outside_particles(filaments: FilamentCollection, system: openmm.System, part
             raise InputError(f"particles contains {index}, but the System has {count} particles.")
         if index in own:
             raise InputError(f"particles contains {index}, which belongs to a filament.")
+    if len(set(indices)) < len(indices):
+        twice = next(index for index in indices if indices.count(index) > 1)
+        raise InputError(f"particles contains {twice} twice.")
     return np.array(indices, dtype=int)
 
 

@@ -16,7 +16,7 @@ import openmm
 from ..engine_choice import available_engines, choose_engine
 from ..errors import InputError
 from ..filaments.collection import FilamentCollection, require_filaments
-from ..units.quantities import LENGTH, STIFFNESS, in_units_of, positive, shown, whole_numbers
+from ..units.quantities import LENGTH, STIFFNESS, in_units_of, one_of, positive, shown, whole_numbers
 from ..units.types import FloatArray, Indices, Numbers, Scalar
 from .contacts import outside_particles
 from .shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, number
@@ -132,8 +132,8 @@ def filament_wall_force(
     stiffness = positive(stiffness, STIFFNESS, "stiffness")
     require_filaments(filaments)
     held = _held(numbers, len(filaments))
-    _choice(side, "side", SIDES)
-    _choice(nodes, "nodes", NODES)
+    one_of(side, SIDES, "side")
+    one_of(nodes, NODES, "nodes")
     if side != "inside" and len(shape.faces) > 1:
         raise InputError(f'side must be "inside" of a {type(shape).__name__}, which has several faces.')
     room = np.inf if side == "outside" else shape.room
@@ -149,18 +149,14 @@ def filament_wall_force(
     for index, value in zip(held, radii):
         own = filaments.node_indices[index], filaments.bead_indices[index]
         places = np.array(filaments[index].type.segment_kind.particles_along(*own))
-        if nodes != "all" and filaments[index].closed:
-            raise InputError(f'Filament {index} is a ring, without ends: nodes must be "all", but is "{nodes}".')
+        if nodes != "all" and (filaments[index].closed or filaments[index].growth is not None):
+            what = "is a ring, without ends" if filaments[index].closed else "grows"
+            raise InputError(f'Filament {index} {what}: nodes must be "all", but is "{nodes}".')
         for place in places[NODES[nodes]]:
             force.addParticle(int(place), float(value))
     for particle, value in zip(spheres, sphere_radii):
         force.addParticle(int(particle), float(value))
     return force
-
-
-def _choice(value, name, choices):
-    if not isinstance(value, str) or value not in choices:
-        raise InputError(f"{name} must be one of {', '.join(choices)}, but is {shown(value)}.")
 
 
 def _held(numbers, count):

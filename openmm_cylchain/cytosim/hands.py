@@ -145,7 +145,8 @@ def _bind_near(translation, hand, settings, end, tracked):
         hand.note(EXACT if reach >= _LEAST_REACH else NEAREST, "bind_only_end", line)
         return
     if alone or end not in _ENDS or tracked != end or not _grows(translation, settings):
-        hand.note(LEFT_OUT, f"bind_only_end = {end}", line, _NEAR_ENDS)
+        key, value = ("track_end", tracked) if end in OFF else ("bind_only_end", end)
+        hand.note(LEFT_OUT, f"{key} = {value}", settings.line_of(key), _NEAR_ENDS)
         return
     hand.table["filament_end"] = {
         "end": _ENDS[end],

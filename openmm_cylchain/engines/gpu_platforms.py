@@ -24,7 +24,7 @@ def enable_platform(name: str) -> None:
     GPU is slower than a processor for a few filaments: see the page on platforms. It lasts until Python ends. Calling
     it again does nothing.
 
-    What is computed on the GPU, and what is refused there, is on that page, too.
+    What the device computes, and what the processor does for it, is on that page, too.
 
     Parameters
     ----------

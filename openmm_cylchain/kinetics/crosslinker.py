@@ -5,12 +5,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..errors import InputError
 from ..units.quantities import (
     DIMENSIONLESS,
     LENGTH,
     STIFFNESS,
-    finite_number,
+    in_units_of,
     non_negative,
     positive,
     require_kind,
@@ -144,8 +146,7 @@ class Crosslinker:
 
 
 def _as_cosines(given, label):
-    values = tuple(given) if isinstance(given, Sequence) and not isinstance(given, str) else ()
-    cosines = tuple(finite_number(value, DIMENSIONLESS, label) for value in values)
-    if len(cosines) != 2 or not -1.0 <= cosines[0] <= cosines[1] <= 1.0:
+    cosines = np.asarray(in_units_of(given, DIMENSIONLESS, label))
+    if cosines.shape != (2,) or not -1.0 <= cosines[0] < cosines[1] <= 1.0:
         raise InputError(f"{label} must be two numbers that ascend, between -1 and 1, but is {shown(given)}.")
-    return cosines
+    return tuple(cosines.tolist())

@@ -201,7 +201,8 @@ def _refuse_without_region(linkers, system):
     walls = [own.region for own in linkers.region]
     if not walls:
         forces = [own for own in map(as_filament_wall_force, system.getForces()) if own is not None]
-        walls = [tuple(force.getRegion()) for force in forces if force.getSide() == "inside"]
+        sides = [(force.getSide(), tuple(force.getRegion())) for force in forces]
+        walls = [wall for side, wall in sides if side == "inside" or (side == "outside" and wall[0] == "plane")]
     if not is_closed(walls, system.usesPeriodicBoundaryConditions()):
         raise InputError(
             f"Linkers {linkers.kind.name!r} diffuse, and need a region: give add_linkers one (a Sphere, Box, Capsule "

@@ -60,7 +60,7 @@ def begin(configuration, simulation, built):
 
 def _of_filaments(settings, engine):
     # The precision if it is that of filaments. Others are of the platform, and so is any with the portable engine, and
-    # on GPUs, where filaments are in double precision.
+    # on GPUs.
     own = engine == "compiled" and settings.platform not in GPU_PLATFORMS
     return settings.precision if own and settings.precision in PRECISIONS else None
 

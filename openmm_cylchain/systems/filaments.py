@@ -359,7 +359,8 @@ class Filaments(TiedFilaments):
         JointWarning
             If a joint of filaments that are not linked where it is has more than 20 EI/h of an element.
         BoxWarning
-            If the System is periodic, but crosslinks, contacts or linkers do not take nearest images.
+            If the System is periodic, but crosslinks, contacts or linkers do not take nearest images, or a wall keeps
+            filaments outside.
 
         Raises
         ------

@@ -190,6 +190,7 @@ private:
     bool draw(LinkerState& state, const KineticStep& step, Pending& next) const;
     void apply(LinkerState& state, const KineticStep& step, Pending& next, Sites* sites, Count& count) const;
     void stayOnChain(Linker& linker, int side, Count& count) const;
+    bool staysBeyond(const Hand& hand, const HandPlace& place) const;
     void walkAll(Linker& linker, const KineticStep& step, Watch& watch, RandomNumbers& random, Count& count) const;
     void sumLengths();
     void findKinds(const KineticStep& step);

@@ -191,12 +191,16 @@ void LinkerKinetics::stayOnChain(Linker& linker, int side, Count& count) const {
     }
     if (contours.isWithin(place.chain, place.position))
         return;
-    const double begin = contours.getBegin(place.chain), end = contours.getEnd(place.chain, 1);
-    const Hand& hand = system.hands[system.types[linker.type].hands[side]];
-    if (hand.holdsAtEnds || (hand.atEnd.tracks && hand.atEnd.end == (place.position > end ? 1 : 0)))
-        place.position = min(end, max(begin, place.position));
+    if (staysBeyond(system.hands[system.types[linker.type].hands[side]], place))
+        place.position = min(contours.getEnd(place.chain, 1), max(contours.getBegin(place.chain), place.position));
     else
         unbind(linker, side, nullptr, count);
+}
+
+/** Whether a hand that would move to a place beyond an end stays on the chain. */
+bool LinkerKinetics::staysBeyond(const Hand& hand, const HandPlace& place) const {
+    return hand.holdsAtEnds || (hand.atEnd.tracks &&
+            hand.atEnd.end == (place.position > contours.getEnd(place.chain, 1) ? 1 : 0));
 }
 
 uint64_t LinkerKinetics::siteOf(const Hand& hand, const HandPlace& place) const {

@@ -100,7 +100,7 @@ void LinkerKinetics::slideHand(Linker& linker, int side, const KineticStep& step
     place.position += move;
     if (!contours.isClosed(place.chain) && !contours.isWithin(place.chain, place.position)) {
         // Beyond an end there is nothing.
-        if (!hand.holdsAtEnds)
+        if (!staysBeyond(hand, place))
             unbind(linker, side, nullptr, count);
         return;
     }

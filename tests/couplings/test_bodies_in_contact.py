@@ -1,5 +1,7 @@
 """Rigid bodies that push each other: their equilibrium beside quadrature and Monte Carlo of the same energies."""
 
+import re
+
 import numpy as np
 import openmm
 import pytest
@@ -13,6 +15,7 @@ from openmm_cylchain import (
     Crosslinks,
     Filaments,
     InputError,
+    InstabilityError,
     Slab,
     capsule_contact_force,
     filament_wall_force,
@@ -286,6 +289,21 @@ def test_a_sphere_does_not_pass_through_another():
     assert 95 < between[0] < 100 and between[1] == between[2] == 0
 
 
+def test_spheres_that_cannot_be_kept_apart_are_named():
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    for x, y in ((0, 0), (99, 0), (0, 99), (99, 99)):
+        filaments.add_body(Body.sphere(50.0), [x, y, 0])
+    _, system, positions = filaments.build()
+    with pytest.warns(ContactWarning, match="hard ones"):
+        _touching(filaments, system, stiffness=1e50)
+        integrator = filaments.create_integrator(system, 4e7, random_seed=1)
+    context = new_context(system, positions, integrator)
+    with pytest.raises(InstabilityError, match="Particle .* its contact with particle") as caught:
+        context.getIntegrator().step(100)
+    first, second = re.findall("article ([0-9]+)", str(caught.value))
+    assert int(first) == caught.value.particle != int(second)
+
+
 def test_what_spheres_without_filaments_need():
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     for x in (0.0, 100.0):
@@ -301,6 +319,8 @@ def test_what_spheres_without_filaments_need():
         _touching(filaments, system, stiffness=0.5 * STIFFNESS)
     with pytest.raises(InputError, match="no two spheres"):
         capsule_contact_force(filaments, system, particles=[0], particle_diameter=100.0)
+    with pytest.raises(InputError, match="particles contains 3 twice"):
+        capsule_contact_force(filaments, system, particles=[0, 3, 3], particle_diameter=100.0)
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     filaments.add_straight(F_ACTIN, 2, [0, 0, 0], [1, 0, 0])
     _, system, _ = filaments.build()

@@ -8,12 +8,17 @@ import openmm
 import pytest
 
 from openmm_cylchain import (
+    ACTIN_ATP,
     F_ACTIN,
     Body,
+    BoxWarning,
+    Crosslinker,
     Crosslinks,
     Cylinder,
     Ellipsoid,
     Filaments,
+    Growth,
+    Hand,
     InputError,
     Plane,
     Slab,
@@ -107,6 +112,11 @@ def test_what_is_refused():
         filament_wall_force(filaments, system, plane, 1.0, side="on")
     with pytest.raises(InputError, match="one of all, ends, first, last"):
         filament_wall_force(filaments, system, plane, 1.0, nodes="middle")
+    grown = Filaments(VISCOSITY, TEMPERATURE)
+    growth = Growth(monomers=ACTIN_ATP, pool=1e-6, longest=1e3)
+    grown.add_straight(ACTIN.with_segment_length(108), 2, [0, 0, 0], [1, 0, 0], growth=growth)
+    with pytest.raises(InputError, match='Filament 0 grows: nodes must be "all"'):
+        filament_wall_force(grown, grown.build()[1], plane, 1.0, nodes="ends")
     force = filament_wall_force(filaments, system, plane, 1.0, side="surface")
     with pytest.raises(openmm.OpenMMException, match="several faces"):
         force.setRegion("box", openmm.Vec3(0, 0, 0), openmm.Vec3(1, 1, 1), 0)
@@ -121,6 +131,22 @@ def test_what_is_refused():
     system.addForce(force)
     with pytest.raises(InputError, match="two stages"):
         filaments.create_integrator(system, 1e6, "implicit-second-order")
+
+
+def test_what_is_kept_outside_in_a_periodic_box():
+    """A wall has no images, which is said; beside a plane, linkers that diffuse have no region."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    filaments.add_straight(ACTIN, 2, [0, 0, 300], [1, 0, 0])
+    hand = Hand(binding_rate=1e-9, reach=30.0, unbinding_rate=1e-9)
+    filaments.add_linkers(Crosslinker(hands=hand, stiffness=0.1), count=10, diffusion=1e-5)
+    _, system, _ = filaments.build(box_vectors=1000.0 * np.eye(3))
+    index = system.addForce(filament_wall_force(filaments, system, Sphere([0, 0, 0], 100.0), 1.0, side="outside"))
+    with pytest.warns(BoxWarning, match="outside.* keeps filaments and linkers out of one place alone"):
+        filaments.create_integrator(system, 1e4)
+    system.removeForce(index)
+    system.addForce(filament_wall_force(filaments, system, Plane([0, 0, 0], [0, 0, -1]), 1.0, side="outside"))
+    with pytest.warns(BoxWarning), pytest.raises(InputError, match="diffuse, and need a region"):
+        filaments.create_integrator(system, 1e4)
 
 
 def test_steps_on_curved_surfaces_are_bounded_by_their_radius():

@@ -136,17 +136,17 @@ def test_what_couples_cannot_do_here_is_said(tmp_path, couple, missing):
 
 
 @pytest.mark.parametrize(
-    ("hand", "missing"),
+    ("hand", "missing", "said"),
     [
-        ("activity = track; track_end = plus_end", "hands near ends"),
-        ("activity = slide; diffusion = 3", "hands that diffuse alone"),
-        ("activity = nucleate; nucleate = 1, tube", "hands: nucleate"),
+        ("activity = track; track_end = plus_end", "hands near ends", "track_end = plus_end"),
+        ("activity = slide; diffusion = 3", "hands that diffuse alone", "it has no mobility"),
+        ("activity = nucleate; nucleate = 1, tube", "hands: nucleate", "activity = nucleate"),
     ],
 )
-def test_what_hands_cannot_do_here_is_said(tmp_path, hand, missing):
+def test_what_hands_cannot_do_here_is_said(tmp_path, hand, missing, said):
     own = f"set hand motor {{ binding = 10, 0.05; unbinding = 1, 3; {hand} }}\n"
     _, document = translated(tmp_path, TUBE + own + COUPLE + "new 4 tube { length = 3 }\nnew 50 link\n")
-    assert document.missing == [missing]
+    assert document.missing == [missing] and f"left out: hand motor: {said}" in document.text()
 
 
 def test_rules_for_pairs_and_hands_that_slide(tmp_path):

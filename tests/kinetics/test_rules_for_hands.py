@@ -8,6 +8,7 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import (
+    ACTIN_ATP,
     F_ACTIN,
     MICROTUBULE,
     BindingRange,
@@ -58,7 +59,9 @@ def test_rules_take_units_and_reach_the_force():
     assert hand.sliding_friction == pytest.approx(2.0 * PICONEWTON * SECOND / 1e3)
     assert hand.holds_at_ends and not replace(hand, at_end="release").holds_at_ends and not HAND.holds_at_ends
     near = replace(HAND, binding_range=BindingRange(end="both", range=0.1 * unit.micrometer, excluded=True))
-    kind = Crosslinker(hands=[hand, near], stiffness=0.1, cosine_range=[0.5, 1], trans_activated=True, reversible=False)
+    kind = Crosslinker(
+        hands=[hand, near], stiffness=0.1, cosine_range=np.array([0.5, 1]), trans_activated=True, reversible=False
+    )
     assert kind.cosine_range == (0.5, 1.0) and kind.has_rules and not replace(kind, hands=HAND).is_motor
     _, context = network((kind, {"count": 5}), (Crosslinker(hands=HAND, stiffness=0.1), {"count": 1}))
     text = openmm.XmlSerializer.serialize(context.getSystem())
@@ -90,7 +93,7 @@ def test_bad_hands_are_refused(changed, message):
 
 
 def test_bad_rules_are_refused():
-    for cosines in ((1.0, 0.5), (-2.0, 1.0), (0.5,), 0.5, "ab", (np.nan, 1.0)):
+    for cosines in ((1.0, 0.5), (0.5, 0.5), (-2.0, 1.0), (0.5,), 0.5, "ab", (np.nan, 1.0)):
         with pytest.raises(InputError, match="cosine_range"):
             Crosslinker(hands=HAND, stiffness=1.0, cosine_range=cosines)
     for changed in ({"end": "middle"}, {"range": 0.0}, {"excluded": 1}):
@@ -241,3 +244,19 @@ def test_friction_of_hands_that_slide_adds_up():
         error = slid.std(ddof=1) / np.sqrt(copies)
         assert 4.0 * error < 0.06 * expected
         assert abs(slid.mean() - expected) < 4.0 * error
+
+
+@pytest.mark.parametrize("end, bound", [("plus", 20), ("minus", 0)])
+def test_hands_that_slide_and_track_an_end_stay_there(end, bound):
+    """Their springs pull them beyond the plus end, where all others let go."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    growth = Growth(monomers=ACTIN_ATP, pool=0.2e-6 * unit.molar, longest=600.0, minus_capped=True)
+    filaments.add_straight(F_ACTIN.with_segment_length(108.0), 3, [0, 0, 0], [1, 0, 0], clamped=[0], growth=growth)
+    tracks = HandAtEnd(end=end, range=20.0, tracks=True)
+    hand = replace(SLIDING, unbinding_rate=0.0, at_end="release", filament_end=tracks, sliding_friction=1e6)
+    filaments.add_linkers(Crosslinker(hands=hand, stiffness=0.05), anchors=[[345.0, 0, 0]] * 20, bound=20)
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 2e6, random_seed=1, checks=False)
+    context = new_context(system, positions, integrator)
+    integrator.step(1000)
+    assert filaments.in_context(context).linkers().counts()[2] == bound

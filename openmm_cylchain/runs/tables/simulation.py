@@ -35,7 +35,7 @@ SIMULATION = TableKind(
             "precision",
             Choice(PRECISIONS),
             None,
-            "Precision of filaments with the compiled engine, else of the platform.",
+            "Of filaments with the compiled engine on Reference and CPU, else of the platform.",
         ),
         Key("threads", Whole(1, 4096, "2"), None, "Threads of the platform CPU; all cores if not given."),
         Key(

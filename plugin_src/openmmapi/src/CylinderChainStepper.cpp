@@ -444,7 +444,7 @@ void CylinderChainStepper::reportCoupling(const BrokenCoupling& coupling, const 
         swap(first, second);
     CylinderChainException::Place place;
     place.step = settings.step+1;
-    place.particle = max(particleAt(first), particleAt(second));
+    place.particle = particleAt(isPart(first) ? second : first);
     stringstream message;
     if (isPart(first)) {
         place.chain = list.getNumberOfStep(first.chain);

@@ -82,7 +82,9 @@ private:
     std::vector<int> indexOf;
     std::vector<Vec3> positions, forces, velocities, added;
     Vec3 box[3];
-    std::vector<int> imageNumbers, order;
+    /** Which particle is in each slot, and where each particle is. */
+    std::vector<int> order, slotOf;
+    std::vector<int> imageNumbers;
     std::vector<double> numbers, boxNumbers, flowNumbers;
     /** The others that move, and for how many included particles and which friction they were found. */
     std::vector<int> others;

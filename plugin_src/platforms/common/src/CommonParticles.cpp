@@ -188,10 +188,10 @@ void CommonParticles::updateSlots() {
     if (order == cc.getAtomIndex())
         return;
     order = cc.getAtomIndex();
-    vector<int> slotOfParticle(order.size());
+    slotOf.resize(order.size());
     for (int slot = 0; slot < cc.getNumAtoms(); slot++)
-        slotOfParticle[order[slot]] = slot;
-    uploadTo(cc, slots, slotOfParticle, "slotsOfParticles");
+        slotOf[order[slot]] = slot;
+    uploadTo(cc, slots, slotOf, "slotsOfParticles");
 }
 
 void CommonParticles::updateImages() {
@@ -199,14 +199,11 @@ void CommonParticles::updateImages() {
 
     if (areImagesValid())
         return;
-    const vector<int>& present = cc.getAtomIndex();
-    vector<int> slotOfParticle(present.size());
-    for (int slot = 0; slot < cc.getNumAtoms(); slot++)
-        slotOfParticle[present[slot]] = slot;
+    updateSlots();
     imageNumbers.clear();
     for (int particle : particles) {
-        const mm_int4 cells = cc.getPosCellOffsets()[slotOfParticle[particle]];
-        imageNumbers.insert(imageNumbers.end(), {slotOfParticle[particle], cells.x, cells.y, cells.z});
+        const mm_int4 cells = cc.getPosCellOffsets()[slotOf[particle]];
+        imageNumbers.insert(imageNumbers.end(), {slotOf[particle], cells.x, cells.y, cells.z});
     }
     uploadTo(cc, images, imageNumbers, "imagesOfParticles");
     uploadTo(cc, included, particles, "includedParticles");
@@ -398,11 +395,9 @@ int CommonParticles::findUnstable() {
     cc.getLongForceBuffer().download(found);
     vector<double> moved(displacements.getSize());
     displacements.download(moved);
-    vector<int> slotOfParticle(slots.getSize());
-    slots.download(slotOfParticle);
     for (int particle : others)
         for (int k = 0; k < 3; k++) {
-            const double force = found[slotOfParticle[particle]+k*(size_t) cc.getPaddedNumAtoms()]/4294967296.0;
+            const double force = found[slotOf[particle]+k*(size_t) cc.getPaddedNumAtoms()]/4294967296.0;
             if (!(fabs(force) < LARGEST_FORCE && fabs(moved[3*(size_t) particle+k]) < 1e300))
                 return particle;
         }
