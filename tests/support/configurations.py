@@ -54,6 +54,11 @@ count = 4
 between = [{ filament = 0, arc_length = "100 nm" }, { point = ["1 um", "1 um", "1 um"] }]
 stiffness = "0.001 pN/nm"
 rest_length = "20 nm"
+[[barrier]]
+filament = 0
+arc_lengths = ["150 nm", "300 nm"]
+toward = "plus"
+release_rate = "10 1/s"
 [[tether]]
 table = 1
 node = 0
