@@ -23,7 +23,7 @@ static void beginInMiddle(const Wall& wall, double* r) {
 }
 
 /** Whether a point is in the region itself. */
-static bool isWithin(const Wall& wall, const double* position) {
+static bool isInShape(const Wall& wall, const double* position) {
     const double* v = wall.vector;
     double r[3];
     for (int k = 0; k < 3; k++)
@@ -54,7 +54,7 @@ static bool isWithin(const Wall& wall, const double* position) {
 }
 
 bool cylchain::encloses(const Wall& wall, const double* position) {
-    return wall.side == WallSide::Surface || isWithin(wall, position) == (wall.side == WallSide::Inside);
+    return wall.side == WallSide::Surface || isInShape(wall, position) == (wall.side == WallSide::Inside);
 }
 
 bool cylchain::encloses(const vector<Wall>& walls, const double* position) {

@@ -147,7 +147,7 @@ static void testNucleationAtWall() {
     nucleator.upper = {20, 100, 100};
     nucleator.direction = {0, 1, 0};
     all.system.nucleators = {nucleator};
-    EndWalls wall({WallShape::Plane, {0, 0, 0}, {1, 0, 0}, 0}, stiffness, Array(60, 0.0));
+    EndWalls wall({WallShape::Plane, WallSide::Inside, {0, 0, 0}, {1, 0, 0}, 0}, stiffness, Array(60, 0.0));
     ChainGrowth growth = all.makeGrowth();
     // Both ends are at the same depth: the energy is twice that of one.
     double inside = 0;

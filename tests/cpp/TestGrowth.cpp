@@ -102,7 +102,7 @@ static void checkRodBeforeWall(double events) {
     for (int i = 0; i < 300; i++)
         all.add(weights, {0, 14}, 2, {}, endOf(100*z, 1), generator);
     // They have two segments from 18 monomers on, for which there are no nodes.
-    EndWalls wall({WallShape::Plane, {distance, 0, 0}, {-1, 0, 0}, 0}, stiffness, Array(300, 0.0));
+    EndWalls wall({WallShape::Plane, WallSide::Inside, {distance, 0, 0}, {-1, 0, 0}, 0}, stiffness, Array(300, 0.0));
     ChainGrowth growth = all.makeGrowth();
     vector<double> counts(18), exact(18);
     const int blocks = 20;
@@ -278,7 +278,7 @@ static void testEnergyOfLoad() {
     for (int i = 0; i < number; i++)
         all.add(weights, {0, 10}, 2, {}, plus, generator);
     // The next monomer is 2 nm deep in it: 2 k_B T, of which E leaves exp(-1).
-    EndWalls wall({WallShape::Plane, {20, 0, 0}, {-1, 0, 0}, 0}, KT, Array(number, 0.0));
+    EndWalls wall({WallShape::Plane, WallSide::Inside, {20, 0, 0}, {-1, 0, 0}, 0}, KT, Array(number, 0.0));
     ChainGrowth growth = all.makeGrowth();
     all.advance(growth, 0.5, 9, {&wall});
     Mean gained;
@@ -305,7 +305,7 @@ static void testBlockedGrowth() {
         const int number = 4000;
         for (int i = 0; i < number; i++)
             own.add(weights, {0, 10}, 2, {}, plus, generator);
-        EndWalls wall({WallShape::Plane, {20, 0, 0}, {-1, 0, 0}, 0}, KT, Array(number, 0.0));
+        EndWalls wall({WallShape::Plane, WallSide::Inside, {20, 0, 0}, {-1, 0, 0}, 0}, KT, Array(number, 0.0));
         ChainGrowth growth = own.makeGrowth();
         const double time = 1.5, came = exp(-1.0), turned = 2*0.2+2*0.35*(1-came);
         own.advance(growth, time, 9, {&wall});
