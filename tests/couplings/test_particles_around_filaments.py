@@ -63,16 +63,16 @@ def test_particles_around_rods_at_the_recommended_step():
     Other rods take as much room there as elsewhere. Particles are few: that they touch each other, too, changes their
     density near rods by less than 1 %.
     """
-    rods, count, steps, blocks = 160, 100, 9000, 20
+    rods, count, blocks, frames, steps_between = 160, 100, 20, 400, 5
     edges = np.array([0.0, 20.0, 30.0, 50.0, 80.0])
     context, nodes, particles = _context(rods, count, np.random.default_rng(3))
     found = np.zeros((blocks, len(edges) - 1))
     for block in range(blocks):
-        for _ in range(steps // blocks):
-            context.getIntegrator().step(1)
+        for _ in range(frames):
+            context.getIntegrator().step(steps_between)
             positions = positions_of(context)
             found[block] += np.histogram(_distances(positions[nodes], positions[particles]), edges)[0]
-    found *= blocks / steps
+    found /= frames
     lower, upper = edges[:-1], edges[1:]
     shells = np.pi * LENGTH * (upper**2 - lower**2) + 4 / 3 * np.pi * (upper**3 - lower**3)
     distance = (np.arange(20000) + 0.5) * 0.001
