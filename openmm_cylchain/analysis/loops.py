@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -74,12 +74,14 @@ def contact_probability(
     inside = np.arange(longest + 1) >= 1
     pairs_in_bins = np.bincount(bin_of[inside], possible[inside], len(edges) - 1)
     logarithms = np.bincount(bin_of[inside], (possible * np.log(np.maximum(np.arange(longest + 1), 1)))[inside])
+    counts = np.array([len(each.nodes) for each in run.filaments])
+    rings = np.array([each.ring for each in run.filaments])
     rows = []
-    for first, second, filament in _contacts(run, own, cutoff):
-        separations = second - first
-        counts = np.array([len(each.nodes) for each in run.filaments])[filament]
-        rings = np.array([each.ring for each in run.filaments])[filament]
-        separations = np.where(rings, np.minimum(separations, counts - separations), separations)
+    for first, second in _contacts(run, own, cutoff):
+        same = first.filament == second.filament
+        filament, separations = first.filament[same], np.abs(second.along - first.along)[same]
+        around = np.minimum(separations, counts[filament] - separations)
+        separations = np.where(rings[filament], around, separations)
         rows.append(np.bincount(bin_of[separations], minlength=len(edges) - 1) / pairs_in_bins)
     return ContactProbability(length * np.exp(logarithms / pairs_in_bins), np.array(rows))
 
@@ -117,8 +119,8 @@ def contact_counts(
     starts = np.cumsum(bins) - bins
     total = int(bins.sum())
     result = scipy.sparse.csr_array((total, total), dtype=np.int64)
-    for first, second, _ in _contacts(run, own, cutoff, among_filaments=True):
-        rows, columns = (starts[number] + along // size for number, along in (first, second))
+    for pair in _contacts(run, own, cutoff):
+        rows, columns = (starts[nodes.filament] + nodes.along // size for nodes in pair)
         apart = rows != columns
         both = np.concatenate([rows, columns[apart]]), np.concatenate([columns, rows[apart]])
         ones = np.ones(len(both[0]), dtype=np.int64)
@@ -176,17 +178,17 @@ def _pairs_by_separation(nodes: int, ring: bool, longest: int) -> FloatArray:
     return nodes * halves * (separations > 0) * (2 * separations <= nodes)
 
 
-def _contacts(run: Run, frames: range, cutoff: float, among_filaments: bool = False) -> Iterator[tuple[Any, Any, Any]]:
-    # Of each frame, pairs of nodes: their numbers along one filament, and this; or a filament and a number of each.
+class _Nodes(NamedTuple):
+    filament: IntArray
+    along: IntArray
+
+
+def _contacts(run: Run, frames: range, cutoff: float) -> Iterator[tuple[_Nodes, _Nodes]]:
+    # Of each frame, pairs of nodes: the filaments of the first and the second ones, and their numbers along these.
     counts = np.array([len(own.nodes) for own in run.filaments])
-    filament: IntArray = np.repeat(np.arange(len(counts)), counts)
+    filament = np.repeat(np.arange(len(counts)), counts)
     along = np.arange(counts.sum()) - (np.cumsum(counts) - counts)[filament]
     for frame in frames:
         pairs = pairs_of_points(np.concatenate(run.nodes(frame)), cutoff, run.box)
-        first, second = pairs.first, pairs.second
-        if among_filaments:
-            yield (filament[first], along[first]), (filament[second], along[second]), None
-            continue
-        same = filament[first] == filament[second]
-        first, second = first[same], second[same]
-        yield np.minimum(along[first], along[second]), np.maximum(along[first], along[second]), filament[first]
+        first, second = (_Nodes(filament[nodes], along[nodes]) for nodes in (pairs.first, pairs.second))
+        yield first, second

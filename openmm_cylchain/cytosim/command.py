@@ -75,9 +75,11 @@ def import_file(path, output, dimensions=None, given=None, trial=False):
     for name in translation.start_files:
         if (output.parent / name).exists():
             raise InputError(f"{output.parent / name} exists already: name another output.")
-    check(translation, translation.document.text(), path)
+    configuration = check(translation, translation.document.text(), path)
     if trial:
-        try_first_steps(translation.document, lambda: check(translation, translation.document.text(), path))
+        try_first_steps(
+            translation.document, configuration, lambda: check(translation, translation.document.text(), path)
+        )
     text = translation.document.text()
     for name, positions in translation.start_files.items():
         np.save(output.parent / name, positions)

@@ -12,16 +12,18 @@ _STEPS, _MOST_SECONDS = 100, 10.0
 _PARTS = (2, 5, 10, 20, 50, 100)
 
 
-def try_first_steps(document, configuration_of):
+def try_first_steps(document, configuration, configuration_of):
     """Divide the time steps of a Document until its run takes its first steps, and say so where that was needed.
 
     Parameters
     ----------
     document : Document
+    configuration : Configuration
+        Of what it says.
     configuration_of : callable ()
-        The Configuration of what it says now.
+        That of what it says after a change.
     """
-    trouble = _trouble(configuration_of())
+    trouble = _trouble(configuration)
     if trouble is None:
         return
     tables = [own for own in document.tables if own.header in ("[simulation]", "[stage.simulation]")]

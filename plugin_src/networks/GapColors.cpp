@@ -3,31 +3,44 @@
 using namespace cylchain;
 using namespace std;
 
-void GapColors::sort(int count, const GapResponses& responses) {
-    colorOf.resize(count);
+void GapColors::begin() {
+    gaps.clear();
     firsts.assign(1, 0);
-    int words = 1;
-    used.assign(responses.getNumChains(), 0);
-    for (int gap = 0; gap < count; gap++) {
-        int color = -1;
-        for (int word = 0; color < 0; word++) {
-            if (word == words)
-                used.resize(++words*(size_t) responses.getNumChains(), 0);
-            uint64_t* const ofWord = &used[word*(size_t) responses.getNumChains()];
-            uint64_t taken = 0;
-            responses.forPorts(gap, [&] (const GapResponses::ChainPorts& chain, int) {
-                taken |= ofWord[responses.numberOf(chain)];
-            });
-            if (taken == ~static_cast<uint64_t>(0))
-                continue;
-            const uint64_t lowest = ~taken&(taken+1);
-            for (color = 64*word; lowest>>(color&63) != 1; color++)
-                continue;
-            responses.forPorts(gap, [&] (const GapResponses::ChainPorts& chain, int) {
-                ofWord[responses.numberOf(chain)] |= lowest;
-            });
-        }
-        colorOf[gap] = color;
+    colorOf.clear();
+    used.clear();
+}
+
+/** The first color that no gap before it on its chains has. */
+int GapColors::findColor(int gap, const GapResponses& responses) {
+    const size_t numChains = responses.getNumChains();
+    for (int word = 0; ; word++) {
+        if (used.size() == word*numChains)
+            used.resize((word+1)*numChains, 0);
+        uint64_t* const ofWord = &used[word*numChains];
+        uint64_t taken = 0;
+        responses.forPorts(gap, [&] (const GapResponses::ChainPorts& chain, int) {
+            taken |= ofWord[responses.numberOf(chain)];
+        });
+        if (taken == ~static_cast<uint64_t>(0))
+            continue;
+        const uint64_t lowest = ~taken&(taken+1);
+        responses.forPorts(gap, [&] (const GapResponses::ChainPorts& chain, int) {
+            ofWord[responses.numberOf(chain)] |= lowest;
+        });
+        int color = 64*word;
+        while (lowest>>(color&63) != 1)
+            color++;
+        return color;
+    }
+}
+
+void GapColors::sort(int count, const GapResponses& responses) {
+    if (count == (int) colorOf.size())
+        return;
+    for (int gap = colorOf.size(); gap < count; gap++)
+        colorOf.push_back(findColor(gap, responses));
+    firsts.assign(1, 0);
+    for (int color : colorOf) {
         if ((int) firsts.size() < color+2)
             firsts.resize(color+2, 0);
         firsts[color+1]++;

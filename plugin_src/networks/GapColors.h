@@ -16,7 +16,11 @@ namespace cylchain {
  */
 class GapColors {
 public:
-    /** Give each gap the first color that none of those before it on its chains has, and sort them by these. */
+    /** Begin a step without gaps. */
+    void begin();
+    /**
+     * Give each new gap the first color that none of those before it on its chains has, and sort all by these.
+     */
     void sort(int count, const GapResponses& responses);
     /** Take those of another order for which a function says so. */
     template <class Function> void select(const GapColors& all, Function isOne) {
@@ -60,6 +64,7 @@ public:
         return largest;
     }
 private:
+    int findColor(int gap, const GapResponses& responses);
     /** Gaps that a thread goes through, which takes about as long as to wake it up. */
     static constexpr int CHUNK = 64;
     /** Sorted by their colors; where each of these begins, and one behind the last. */

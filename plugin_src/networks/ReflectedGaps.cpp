@@ -55,6 +55,7 @@ double reflect(double start, double end, double all, double part, double variate
 
 void ReflectedGaps::begin(const StepSettings& settings, const ChainPlaces& places) {
     responses.begin(places.getNumChains());
+    all.begin();
     kT = settings.kT;
     precision = settings.precision;
     noise = GapNoise({(uint32_t) settings.seed, (uint32_t) settings.level, settings.step});

@@ -223,19 +223,13 @@ bool WallEquations::markUnfinished(PackFlags& packs) const {
     return true;
 }
 
-/** Whether a particle that is kept outside has passed the wall. */
-bool WallEquations::hasPassed(int i, const double* moved) const {
-    return places[i].pack >= 0 && passesThrough(system->wall, positionOf(i, begun).at, positionOf(i, moved).at);
-}
-
 void WallEquations::findFailures(const double* moved, vector<bool>& failed) {
     for (const Part& part : parts)
         for (const State& state : part.states)
             if (state.unfinished)
                 failed[places[state.particle].chain] = true;
-    for (size_t i = 0; i < places.size() && system->wall.side == WallSide::Outside; i++)
-        if (hasPassed(i, moved))
-            failed[places[i].chain] = true;
+    for (int i : findPassed(*system, places, begun, moved))
+        failed[places[i].chain] = true;
 }
 
 bool WallEquations::findCulprit(const double* moved, const CouplingEquation*, BrokenCoupling& culprit) const {
@@ -247,10 +241,8 @@ bool WallEquations::findCulprit(const double* moved, const CouplingEquation*, Br
         for (const State& state : part.states)
             if (state.unfinished)
                 return find(state.particle);
-    for (size_t i = 0; i < places.size(); i++)
-        if (hasPassed(i, moved))
-            return find(i);
-    return false;
+    const vector<int> passed = findPassed(*system, places, begun, moved);
+    return !passed.empty() && find(passed[0]);
 }
 
 void WallEquations::findPushes(const double* moved, vector<Push>& pushes) const {

@@ -73,7 +73,6 @@ private:
         return places[particle].pack >= 0 && (*active)[places[particle].pack];
     }
     void finishPart(int part, const double* moves, const double* moved);
-    bool hasPassed(int particle, const double* moved) const;
     bool isBesideDeeper(int particle, int face, double depth, const double* moved) const;
     RestGap findRestGap(int particle, int face, double depth) const;
     const WallSystem* system = nullptr;

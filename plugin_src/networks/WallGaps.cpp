@@ -137,15 +137,9 @@ bool WallGaps::findGaps(int, bool, const double* moved, ReflectedGaps& gaps) {
     return false;
 }
 
-/** Whether a particle that is kept outside has passed the wall. What is kept inside has no other side to get to. */
-bool WallGaps::hasPassed(int i, const double* moved) const {
-    return places[i].pack >= 0 && passesThrough(system->wall, positionOf(i, begun).at, positionOf(i, moved).at);
-}
-
 void WallGaps::findFailures(const double* moved, vector<bool>& failed) {
-    for (size_t i = 0; i < places.size() && system->wall.side == WallSide::Outside; i++)
-        if (hasPassed(i, moved))
-            failed[places[i].chain] = true;
+    for (int i : findPassed(*system, places, begun, moved))
+        failed[places[i].chain] = true;
 }
 
 bool WallGaps::findCulprit(const double* moved, const CouplingEquation*, BrokenCoupling& culprit) const {
@@ -156,10 +150,8 @@ bool WallGaps::findCulprit(const double* moved, const CouplingEquation*, BrokenC
     for (const State& state : states)
         if (all->isUnfinished(state.gap))
             return find(state.particle);
-    for (size_t i = 0; i < places.size(); i++)
-        if (hasPassed(i, moved))
-            return find(i);
-    return false;
+    const vector<int> passed = findPassed(*system, places, begun, moved);
+    return !passed.empty() && find(passed[0]);
 }
 
 void WallGaps::findPushes(const double*, vector<Push>& pushes) const {

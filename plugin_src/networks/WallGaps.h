@@ -55,7 +55,6 @@ private:
     WallPosition positionOf(int particle, const double* positions) const {
         return cylchain::positionOf(system->particles[particle], positions);
     }
-    bool hasPassed(int particle, const double* moved) const;
     void follow(const State& state, const double* moved, Gap& gap) const;
     void findNew(int part, const double* moved);
     /** Those of steps that do not resolve contacts beside them. */

@@ -2,7 +2,10 @@
 #define CYLCHAIN_WALL_POSITIONS_H_
 
 #include "couplings/Walls.h"
+#include "networks/ChainPlaces.h"
 #include <algorithm>
+#include <cstddef>
+#include <vector>
 
 namespace cylchain {
 
@@ -18,6 +21,21 @@ inline WallPosition positionOf(const WallParticle& particle, const double* posit
     else
         std::copy_n(positions+3*particle.particle, 3, result.at);
     return result;
+}
+
+/**
+ * The particles that have passed a wall which keeps them outside. What is kept inside has no other side to get to.
+ *
+ * @param places  those of its particles; what does not move has passed nothing
+ */
+inline std::vector<int> findPassed(const WallSystem& system, const std::vector<PlaceOnChain>& places,
+        const double* begun, const double* moved) {
+    std::vector<int> passed;
+    for (std::size_t i = 0; i < places.size() && system.wall.side == WallSide::Outside; i++)
+        if (places[i].pack >= 0 && passesThrough(system.wall, positionOf(system.particles[i], begun).at,
+                positionOf(system.particles[i], moved).at))
+            passed.push_back(i);
+    return passed;
 }
 
 /** Where a particle was, and the square of how far it may go from there before it is beyond another face. */

@@ -139,17 +139,34 @@ static void testGradients() {
         }
 }
 
+/** Compare how the gradient of a depth changes with the position, a symmetric matrix, with differences of gradients. */
+static void checkChangeOfGradient(const Wall& wall, Array x, const double* found, double scale, double tolerance,
+        const string& what) {
+    const double width = 1e-5;
+    int entry = 0;
+    for (int j = 0; j < 3; j++)
+        for (int k = j; k < 3; k++) {
+            const double here = x[k];
+            double above[3], below[3];
+            x[k] = here+width;
+            findDepth(wall, 0, x.data(), 0, above);
+            x[k] = here-width;
+            findDepth(wall, 0, x.data(), 0, below);
+            x[k] = here;
+            checkClose((above[j]-below[j])/(2*width), found[entry++], scale, tolerance, what);
+        }
+}
+
 /** How a force turns, against differences of gradients. */
 static void testTurning() {
     NormalNumbers normal(4);
-    const double width = 1e-5;
     int caps = 0;
     for (const Wall& wall : WALLS) {
         if (!isRound(wall))
             continue;
         for (int i = 0; i < 200; i++) {
             Array x = normal(3);
-            double g[3], above[3], below[3], turning[6] = {};
+            double g[3], turning[6] = {};
             const double distance = findDepth(wall, 0, x.data(), 0, g)+wall.length;
             if (distance < 0.1)
                 continue;
@@ -158,17 +175,7 @@ static void testTurning() {
                 along += g[k]*wall.vector[k];
             caps += wall.shape == WallShape::Capsule && fabs(along) > 1e-9;
             addTurning(wall, g, 1/distance, turning);
-            int entry = 0;
-            for (int j = 0; j < 3; j++)
-                for (int k = j; k < 3; k++) {
-                    const double here = x[k];
-                    x[k] = here+width;
-                    findDepth(wall, 0, x.data(), 0, above);
-                    x[k] = here-width;
-                    findDepth(wall, 0, x.data(), 0, below);
-                    x[k] = here;
-                    checkClose((above[j]-below[j])/(2*width), turning[entry++], 1/distance, 1e-4, "a turning force");
-                }
+            checkChangeOfGradient(wall, x, turning, 1/distance, 1e-4, "a turning force");
         }
     }
     check(caps > 20 && caps < 180, "positions beside the cylinder and beside the caps");
@@ -199,28 +206,16 @@ static void testMeanGradients() {
 /** Second derivatives of depths, against differences of gradients. */
 static void testCurvatures() {
     NormalNumbers normal(6);
-    const double width = 1e-5;
     for (const Wall& wall : WALLS) {
         if (countFaces(wall) > 1)
             continue;
         for (int i = 0; i < 100; i++) {
             Array x = normal(3);
-            double g[3], above[3], below[3], curvature[6];
+            double curvature[6];
             for (int k = 0; k < 3; k++)
                 x[k] += wall.point[k]+(x[k] > 0 ? 1 : -1);
-            findDepth(wall, 0, x.data(), 0, g);
             findCurvature(wall, x.data(), curvature);
-            int entry = 0;
-            for (int j = 0; j < 3; j++)
-                for (int k = j; k < 3; k++) {
-                    const double here = x[k];
-                    x[k] = here+width;
-                    findDepth(wall, 0, x.data(), 0, above);
-                    x[k] = here-width;
-                    findDepth(wall, 0, x.data(), 0, below);
-                    x[k] = here;
-                    checkClose((above[j]-below[j])/(2*width), curvature[entry++], 1, 2e-4, "a second derivative");
-                }
+            checkChangeOfGradient(wall, x, curvature, 1, 2e-4, "a second derivative");
         }
     }
 }

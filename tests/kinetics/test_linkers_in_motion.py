@@ -4,28 +4,20 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
-import openmm
 import pytest
 
 from openmm_cylchain import (
     F_ACTIN,
     MICROTUBULE,
     Crosslinker,
-    Crosslinks,
     Filaments,
     Hand,
     TimeStepWarning,
     constant_force,
 )
 from support.contexts import new_context
-from support.linker_contexts import PICONEWTON, SECOND, glide
+from support.linker_contexts import PICONEWTON, SECOND, context_with_trapped_linkers, fixed_filament, glide
 from support.solvent import KT, TEMPERATURE, VISCOSITY
-
-
-def fixed_filament(filaments, segments, start):
-    """A filament of which only the last node moves, far from all else."""
-    nodes = np.array(start) + 100.0 * np.arange(segments + 1)[:, None] * np.array([1.0, 0.0, 0.0])
-    return filaments.add_nodes(F_ACTIN.with_segment_length(100.0), nodes, clamped=range(segments))
 
 
 def expected_binding(weight, stiffness, rest_length, trap, above):
@@ -57,24 +49,9 @@ def test_binding_and_motion_are_in_equilibrium_together(step, rest_length, strai
     fixed_filament(filaments, 2 * copies + 4, (0.0, 0.0, 0.0))
     hand = Hand(binding_rate=80.0 / relaxation, reach=90.0, unbinding_rate=1.0 / relaxation, strain_share=strain_share)
     centres = np.column_stack([200.0 * np.arange(copies) + 150.0, np.full(copies, above), np.zeros(copies)])
-    system, topology = openmm.System(), openmm.app.Topology()
-    chain = topology.addChain()
-    for _ in range(copies):
-        system.addParticle(1.0)
-        topology.addAtom("P", None, topology.addResidue("P", chain))
-    filaments.add_linkers(
-        Crosslinker(hands=hand, stiffness=stiffness, rest_length=rest_length), anchors=np.arange(copies)
-    )
-    positions = filaments.add_to(topology, system, centres)
-    traps = Crosslinks(stiffness=trap, rest_length=0.0)
-    for particle, centre in enumerate(centres):
-        traps.add(None, particle, centre)
-    traps.add_to(system)
-    integrator = filaments.create_integrator(
-        system, step * relaxation, particle_friction=friction, random_seed=3, checks=False
-    )
-    context = new_context(system, positions, integrator)
-    here = filaments.in_context(context)
+    crosslinker = Crosslinker(hands=hand, stiffness=stiffness, rest_length=rest_length)
+    context = context_with_trapped_linkers(filaments, crosslinker, centres, trap, friction, step * relaxation)
+    here, integrator = filaments.in_context(context), context.getIntegrator()
     interval = max(1, round(1.5 / step))
     integrator.step(8 * interval)
     bound, squares = [], []

@@ -13,7 +13,6 @@ from openmm_cylchain import (
     MICROTUBULE,
     BindingRange,
     Crosslinker,
-    Crosslinks,
     Filaments,
     Growth,
     Hand,
@@ -25,7 +24,13 @@ from openmm_cylchain import (
 )
 from openmm_cylchain.kinetics.binding_force import find_binding_force
 from support.contexts import new_context
-from support.linker_contexts import PICONEWTON, SECOND, check_that_runs_go_on_to_the_bit
+from support.linker_contexts import (
+    PICONEWTON,
+    SECOND,
+    check_that_runs_go_on_to_the_bit,
+    context_with_trapped_linkers,
+    fixed_filament,
+)
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 pytest.importorskip("openmm_cylchain.plugin")
@@ -160,28 +165,12 @@ def test_sliding_and_motion_are_in_equilibrium_together(step):
     friction = 1e6
     relaxation = friction / trap
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
-    nodes = np.array([[100.0 * i, 0.0, 0.0] for i in range(2 * copies + 5)])
-    filaments.add_nodes(F_ACTIN.with_segment_length(100.0), nodes, clamped=range(2 * copies + 4))
+    fixed_filament(filaments, 2 * copies + 4, (0.0, 0.0, 0.0))
     hand = Hand(binding_rate=0.0, reach=90.0, unbinding_rate=0.0, sliding_friction=0.7 * friction)
     centres = np.column_stack([200.0 * np.arange(copies) + 150.0, np.full(copies, above), np.zeros(copies)])
-    system, topology = openmm.System(), openmm.app.Topology()
-    chain = topology.addChain()
-    for _ in range(copies):
-        system.addParticle(1.0)
-        topology.addAtom("P", None, topology.addResidue("P", chain))
-    filaments.add_linkers(
-        Crosslinker(hands=hand, stiffness=stiffness, rest_length=rest_length), anchors=np.arange(copies)
-    )
-    positions = filaments.add_to(topology, system, centres)
-    traps = Crosslinks(stiffness=trap, rest_length=0.0)
-    for particle, centre in enumerate(centres):
-        traps.add(None, particle, centre)
-    traps.add_to(system)
-    integrator = filaments.create_integrator(
-        system, step * relaxation, particle_friction=friction, random_seed=3, checks=False
-    )
-    context = new_context(system, positions, integrator)
-    here = filaments.in_context(context)
+    crosslinker = Crosslinker(hands=hand, stiffness=stiffness, rest_length=rest_length)
+    context = context_with_trapped_linkers(filaments, crosslinker, centres, trap, friction, step * relaxation)
+    here, integrator = filaments.in_context(context), context.getIntegrator()
     table = here.linkers()
     bound, places = table.filaments.copy(), table.arc_lengths.copy()
     bound[:, 1], places[:, 1] = 0, centres[:, 0]

@@ -1,9 +1,9 @@
-"""Contexts with linkers: whether they go on to the bit, and how far fixed motors move a filament."""
+"""Contexts with linkers: whether they go on to the bit, in traps, and how far fixed motors move a filament."""
 
 import numpy as np
 import openmm
 
-from openmm_cylchain import Crosslinker, Hand
+from openmm_cylchain import F_ACTIN, Crosslinker, Crosslinks, Hand
 from support.contexts import new_context, positions_of
 
 SECOND = 1e12
@@ -47,6 +47,41 @@ def check_that_runs_go_on_to_the_bit(network):
     assert same_linkers(other.in_context(fresh).linkers(), expected[0])
     assert np.array_equal(positions_of(fresh), expected[1])
     return filaments, expected[0]
+
+
+def fixed_filament(filaments, segments, start):
+    """A filament of which only the last node moves, far from all else."""
+    nodes = np.array(start) + 100.0 * np.arange(segments + 1)[:, None] * np.array([1.0, 0.0, 0.0])
+    return filaments.add_nodes(F_ACTIN.with_segment_length(100.0), nodes, clamped=range(segments))
+
+
+def context_with_trapped_linkers(filaments, crosslinker, centres, trap, friction, step):
+    """Particles in harmonic traps, each with a linker on it.
+
+    Parameters
+    ----------
+    filaments : Filaments
+        With the filaments that hands may bind.
+    crosslinker : Crosslinker
+    centres : (particles, 3) array
+        Of traps.
+    trap, friction : float
+        Stiffness of a trap, and friction of a particle.
+    step : float
+    """
+    system, topology = openmm.System(), openmm.app.Topology()
+    chain = topology.addChain()
+    for _ in centres:
+        system.addParticle(1.0)
+        topology.addAtom("P", None, topology.addResidue("P", chain))
+    filaments.add_linkers(crosslinker, anchors=np.arange(len(centres)))
+    positions = filaments.add_to(topology, system, centres)
+    traps = Crosslinks(stiffness=trap, rest_length=0.0)
+    for particle, centre in enumerate(centres):
+        traps.add(None, particle, centre)
+    traps.add_to(system)
+    integrator = filaments.create_integrator(system, step, particle_friction=friction, random_seed=3, checks=False)
+    return new_context(system, positions, integrator)
 
 
 def glide(filaments):

@@ -401,6 +401,7 @@ def _filaments(entries, groups):
 
 
 def check_filament(entries, number, groups):
+    """Raise ConfigurationError for the number of a filament that FilamentGroups do not have."""
     count = sum(group.count for group in groups)
     if number >= count:
         raise entries.at("filament").error(f"{number} does not exist; there are {count}, counted from 0.")

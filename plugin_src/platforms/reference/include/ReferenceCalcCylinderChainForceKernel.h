@@ -66,12 +66,6 @@ public:
      * they are.
      */
     const double* getBox() const;
-    /**
-     * Get the particles of the Context.
-     */
-    HostParticles& getParticles() {
-        return *particles;
-    }
 private:
     void createEngines();
     cylchain::ChainEnergy addForces(std::vector<Vec3>& forces, bool includeEnergy);
