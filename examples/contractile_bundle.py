@@ -5,8 +5,7 @@ ends with both of their heads, and pull filaments of opposite directions past ea
 together, bind and unbind. Filaments do not pass through each other. The bundle becomes shorter; with motors that do not
 walk, for comparison, it does not.
 
-Steps resolve contacts. Three in a thousand must be divided, of which a warning comes; of longer ones, more. How much so
-few filaments contract is chance: a few percent more or less.
+Steps resolve contacts. How much so few filaments contract is chance: a few percent more or less.
 
     python contractile_bundle.py [folder] [steps]
 """

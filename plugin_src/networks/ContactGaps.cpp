@@ -1,6 +1,7 @@
 #include "networks/ContactGaps.h"
 #include "couplings/Crossings.h"
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -17,6 +18,9 @@ const double NARROWER[] = {1, 0.6, 0.35, 0.2};
 const double SAME_TOUCH = 0.01;
 /** The number of iterations in which places and normals move. */
 const int MOVING_ITERATIONS = 3;
+/** How often a gap is found again when all has converged, and from which thermal change of it on. */
+const int MOST_TIMES_AGAIN = 4;
+const double LARGEST_CHANGE = 1;
 /** The largest depth of a hard surface, over the sum of the radii: it is before the axes. */
 const double LARGEST_DEPTH = 0.95;
 /** Capsules or pairs that a thread looks at together. */
@@ -304,12 +308,61 @@ void ContactGaps::selectNear(int firstNew) {
         }
 }
 
-/** Find the gap of a pair where an iteration has led, or how far it has moved once iterations move it little. */
-void ContactGaps::follow(NearPair& own) const {
+/**
+ * Find where a contact is that has gone on from a pair to segments beside it.
+ *
+ * @param last      receives these
+ * @param contacts  room for two: theirs, the deepest if there are several
+ * @return the number of contacts
+ */
+int ContactGaps::findContactsBeside(const ContactPair& pair, ContactPair& last, Contact* contacts) const {
+    auto around = [&] (int capsule) {
+        return array<int, 3> {capsule, search->getNeighbor(capsule, false), search->getNeighbor(capsule, true)};
+    };
+    int result = 0;
+    double deepest = 0;
+    for (int a : around(pair.a))
+        for (int b : around(pair.b)) {
+            if (a < 0 || b < 0 || search->isExcluded(a, b) || (a == pair.a && b == pair.b))
+                continue;
+            ContactPair beside = pair;
+            beside.a = a;
+            beside.b = b;
+            beside.before = 0;
+            Contact found[2], before[2];
+            const int count = search->evaluate(beside, found, deepest);
+            // What touched there at the start has a gap of its own.
+            if (count <= 0 || search->evaluate(beside, begun, begun, before, 0) > 0)
+                continue;
+            result = count;
+            copy_n(found, count, contacts);
+            deepest = min(found[0].gap, found[count-1].gap);
+            last = beside;
+        }
+    return result;
+}
+
+/** The pair that a lever of a gap holds apart. */
+ContactPair ContactGaps::pairOfLever(const NearPair& own, int lever) const {
+    ContactPair result = pairs.get(own.pair);
+    if (lever >= own.start.count) {
+        result.a = own.last[0];
+        result.b = own.last[1];
+    }
+    return result;
+}
+
+/**
+ * Find the gap of a pair where an iteration has led, or how far it has moved once iterations move it little.
+ *
+ * @param again  whether the gap is found in any case
+ */
+void ContactGaps::follow(NearPair& own, bool again) const {
     const ContactPair& pair = pairs.get(own.pair);
     const double way = motion.getWay(pair.a, pair.b), radii = radiiOf(pair);
     const bool isNew = own.way < 0;
-    own.hasMoved = isNew || (way-own.way > SAME_TOUCH*radii && (own.number < 0 || iterations <= MOVING_ITERATIONS));
+    const bool mayMove = own.number < 0 || iterations <= MOVING_ITERATIONS;
+    own.hasMoved = isNew || again || (mayMove && way-own.way > SAME_TOUCH*radii);
     if (!own.hasMoved) {
         if (own.number >= 0)
             own.gap.end = own.offset+findEnd(own);
@@ -327,16 +380,22 @@ void ContactGaps::follow(NearPair& own) const {
         own.gap.response = places[pair.a].response+places[pair.b].response;
         own.depth = placeHardSurface(own.pair, own.start.gap, own.gap);
     }
-    const int count = search->evaluate(pair, contacts);
+    int count = search->evaluate(pair, contacts);
     // What touches a neighbor at the start and at the end is no gap of this pair.
     own.gap.present = count > 0 || own.touchedAtStart;
-    PairGap end = findPairGap(search->getSegments(pair, true), contacts, count, radii);
+    ContactPair last = pair;
+    if (count == 0 && own.touchedAtStart && own.gap.law == GapLaw::Spring)
+        count = findContactsBeside(pair, last, contacts);
+    own.last[0] = last.a;
+    own.last[1] = last.b;
+    PairGap end = findPairGap(search->getSegments(last, true), contacts, count, radii);
     own.gap.numLevers = 0;
     for (const PairGap* of : {&own.start, &end})
         for (int i = 0; i < of->count; i++) {
             GapLever& lever = own.gap.levers[own.gap.numLevers];
-            lever.places[0] = placeOf(pair.a, of->s[i]);
-            lever.places[1] = placeOf(pair.b, of->t[i]);
+            const ContactPair& touching = of == &end ? last : pair;
+            lever.places[0] = placeOf(touching.a, of->s[i]);
+            lever.places[1] = placeOf(touching.b, of->t[i]);
             lever.gradient[0] = 0.5*of->gradients[i].x;
             lever.gradient[1] = 0.5*of->gradients[i].y;
             lever.gradient[2] = 0.5*of->gradients[i].z;
@@ -354,9 +413,9 @@ bool ContactGaps::mayClose(const Gap& gap) const {
 
 /** How far the places of the levers of a gap are apart along its gradients. */
 double ContactGaps::findEnd(const NearPair& own) const {
-    const SegmentPair end = search->getSegments(pairs.get(own.pair), true);
     double sum = 0;
     for (int lever = 0; lever < own.gap.numLevers; lever++) {
+        const SegmentPair end = search->getSegments(pairOfLever(own, lever), true);
         const Vec3d r = end.between(own.fractions[lever][0], own.fractions[lever][1]);
         const double* const g = own.gap.levers[lever].gradient;
         sum += r.x*g[0]+r.y*g[1]+r.z*g[2];
@@ -381,6 +440,7 @@ bool ContactGaps::isOfNeighbor(const NearPair& own, const vector<const NearPair*
 }
 
 bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, ReflectedGaps& gaps) {
+    crossedAreKnown = false;
     if (movesTooFar)
         return false;
     all = &gaps;
@@ -424,12 +484,42 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
     return motion.exceedsReach() && !settled;
 }
 
+bool ContactGaps::followAgain(ReflectedGaps& gaps) {
+    findCrossed();
+    const double largest = LARGEST_CHANGE*sqrt(kT/stiffness);
+    runInChunks(*loop, near.size(), CHUNK_OF_CAPSULES, [&] (int i) {
+        NearPair& own = near[i];
+        own.hasMoved = false;
+        if (own.number < 0 || own.timesAgain == MOST_TIMES_AGAIN)
+            return;
+        const ContactPair& pair = pairs.get(own.pair);
+        const bool hasCrossed = binary_search(crossed.begin(), crossed.end(), own.pair);
+        // Neither the gap nor what its places make of it has changed by more than this way.
+        if (!hasCrossed && !(2*(motion.getWay(pair.a, pair.b)-own.way) > largest))
+            return;
+        NearPair again = own;
+        again.timesAgain++;
+        follow(again, true);
+        const bool isOther = again.gap.present != own.gap.present || fabs(again.gap.end-own.gap.end) > largest;
+        if (hasCrossed || (isOther && min(again.gap.end, own.gap.end) < 0))
+            own = again;
+    });
+    bool any = false;
+    for (const NearPair& own : near)
+        if (own.hasMoved) {
+            gaps.get(own.number) = own.gap;
+            any = true;
+        }
+    return any;
+}
+
 void ContactGaps::findFailures(const double*, vector<bool>& failed) {
     if (movesTooFar)
         for (const CapsulePlace& own : places)
             if (own.place.pack >= 0)
                 failed[own.place.chain] = true;
-    findCrossed();
+    if (!crossedAreKnown)
+        findCrossed();
     for (int i : crossed)
         for (int capsule : {pairs.get(i).a, pairs.get(i).b})
             if (places[capsule].place.pack >= 0)
@@ -439,6 +529,7 @@ void ContactGaps::findFailures(const double*, vector<bool>& failed) {
 /** Find pairs that have passed through each other, although their gaps do not see it, or they have none. */
 void ContactGaps::findCrossed() {
     crossed.clear();
+    crossedAreKnown = true;
     if (movesTooFar)
         return;
     const int count = pairs.size(), chunks = (count+CHUNK_OF_CAPSULES-1)/CHUNK_OF_CAPSULES;
@@ -499,8 +590,8 @@ void ContactGaps::findPushes(const double*, vector<Push>& pushes) const {
         const double force = own.number < 0 ? 0 : all->getForce(own.number);
         if (force == 0)
             continue;
-        const ContactPair& pair = pairs.get(own.pair);
         for (int lever = 0; lever < own.gap.numLevers; lever++) {
+            const ContactPair pair = pairOfLever(own, lever);
             pushes.push_back(pushOfContact(search->getSystem(), pair.a, pair.b, own.fractions[lever][0],
                     own.fractions[lever][1], force, own.gap.levers[lever].gradient));
             pushes.back().chains[0] = places[pair.a].place.chain;

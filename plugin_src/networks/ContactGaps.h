@@ -19,7 +19,8 @@ namespace cylchain {
  *
  * A pair has one gap for its energy at the start and at the end, each with the contacts that it has then: so a step
  * back has the same gaps. Half of the force acts where they are nearest at the start, half where they are at the end.
- * Segments that have crossed in the end, which gaps do not see where they turn far, fail.
+ * One that its spring holds in goes on with the contact to the next segment. After a few iterations the places of a gap
+ * stay. Where all has converged, gaps that are others by now are found again, and segments that still have crossed fail.
  */
 class ContactGaps : public ImplicitCouplings {
 public:
@@ -44,6 +45,7 @@ public:
     Rests getRests() const override {
         return Rests::Wrong;
     }
+    bool followAgain(ReflectedGaps& gaps) override;
     void findFailures(const double* moved, std::vector<bool>& failed) override;
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
     void findPushes(const double* moved, std::vector<Push>& pushes) const override;
@@ -76,8 +78,12 @@ private:
         Gap gap;
         int number = -1;
         double depth = 0;
+        /** Those that touch in the end: of the pair, or beside them. */
+        int last[2] = {};
         /** Where its levers are, and what these lack of the gap. */
         double fractions[4][2] = {}, offset = 0;
+        /** How often it has been found again when all had converged. */
+        int timesAgain = 0;
     };
     struct Part {
         std::vector<int> pairs;
@@ -94,7 +100,9 @@ private:
         return (std::uint32_t) force*0x9E3779B1u+pair.a;
     }
     void selectNear(int firstNew);
-    void follow(NearPair& near) const;
+    void follow(NearPair& near, bool again = false) const;
+    int findContactsBeside(const ContactPair& pair, ContactPair& last, Contact* contacts) const;
+    ContactPair pairOfLever(const NearPair& near, int lever) const;
     bool mayClose(const Gap& gap) const;
     bool isOfNeighbor(const NearPair& own, const std::vector<const NearPair*>& deep) const;
     double findEnd(const NearPair& near) const;
@@ -129,8 +137,9 @@ private:
     std::vector<NearPair> near;
     /** Those of the last search. */
     std::vector<ContactPair> found;
-    /** Those that have crossed in the end. */
+    /** Those that have crossed in the end, and whether they are those of the last iteration. */
     std::vector<int> crossed;
+    bool crossedAreKnown = false;
     CapsuleMotion motion;
     std::vector<Part> parts;
     /** Whether capsules move too far to look for contacts, in the periodic box or anywhere: the step is divided. */

@@ -134,6 +134,14 @@ public:
         return Rests::Possible;
     }
     /**
+     * Find gaps again whose places stay in iterations, where all has converged.
+     *
+     * @return whether any of them is another one, so that another iteration may be needed
+     */
+    virtual bool followAgain(ReflectedGaps&) {
+        return false;
+    }
+    /**
      * Mark the packs that need another iteration, after finishIteration() has said that one is needed.
      *
      * @return whether that is known; if not, all do

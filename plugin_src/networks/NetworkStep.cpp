@@ -314,7 +314,12 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
             return more;
         };
         const bool more = findGaps(false), unfinished = gaps.anyUnfinished();
-        if (!any && !unfinished && (!more || (!findGaps(true) && !gaps.anyUnfinished())))
+        if (any || unfinished || (more && (findGaps(true) || gaps.anyUnfinished())))
+            continue;
+        bool others = false;
+        for (ImplicitCouplings* own : couplings)
+            others |= own->followAgain(gaps);
+        if (!others || !gaps.anyUnfinished())
             return true;
     }
     return false;
