@@ -104,7 +104,7 @@ public:
         equations.template substitute<Goal::Find>();
         if constexpr (HAS_TWIST)
             if (step.pack.twist.isHeld)
-                twist.shareTorque(equations);
+                twist.shareTorque(equations, iteration);
     }
     /** Ask for the memory that eliminate() begins with. */
     void prefetchStart() const {

@@ -103,11 +103,14 @@ public:
     /**
      * Let all torques of chains that are held change with the nodes: what the equations without that have found for the
      * changes of nodes becomes what those with it do.
+     *
+     * @param iteration  how many there were before; the first one finds how far nodes give way, for all
      */
-    template <class Equations> void shareTorque(Equations& equations) const {
+    template <class Equations> void shareTorque(Equations& equations, int iteration) const {
         Vec* const response = step.gradient+step.n;
         Vec* const forces = response+step.n;
-        equations.respond(step.gradient, response);
+        if (iteration == 0)
+            equations.respond(step.gradient, response);
         Real found = Real{}, own = Real{};
         for (int node = 0; node < step.n; node++) {
             found = found+step.gradient[node].dot(step.change[node]);
