@@ -11,6 +11,7 @@ import openmm
 
 from ..engine_choice import why_openmm_differs
 from ..errors import InputError, InstabilityError, instability_in_force, note_raised_in_force
+from ..filaments.twist import has_twist
 from ..kinetics.binding_force import find_binding_force, make_binding_force
 from ..kinetics.growth_force import make_growth_force
 from ..mechanics.flow import Flow, as_flow
@@ -24,7 +25,6 @@ from ..time_steps.schemes import SCHEMES as ALL_SCHEMES
 from ..time_steps.step_watch import DividedSteps, ExplicitWork
 from ..time_steps.time_step import as_step
 from ..units.quantities import TEMPERATURE, non_negative, whole_number
-from ..filaments.twist import has_twist
 from .compiled_twist import set_end_frame, set_twists_of, twists_of
 from .description import (
     advice_after_blow_up,

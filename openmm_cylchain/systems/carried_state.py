@@ -43,8 +43,8 @@ def carry_state(
 ) -> None:
     """Bring a Context into the state of another one.
 
-    Positions, time, the count of steps, by which noise is drawn, what has grown, twists and linkers go on; flow, crosslinks and
-    where tethers are stay as they are.
+    Positions, time, the count of steps, by which noise is drawn, what has grown, twists and linkers go on; flow,
+    crosslinks and where tethers are stay as they are.
 
     Parameters
     ----------

@@ -288,8 +288,8 @@ class FilamentsInContext:
     def twists(self, filament: int) -> unit.Quantity:
         """Twists of a filament: the angle of the material frames of neighbouring segments beyond parallel transport.
 
-        They are followed in time and not wrapped, so no turn is lost. A Context begins with zero. Checkpoints and States
-        with ``integratorParameters=True`` hold them; setting positions does not change them.
+        They are followed in time and not wrapped, so no turn is lost. A Context begins with zero. Checkpoints and
+        States with ``integratorParameters=True`` hold them; setting positions does not change them.
 
         Parameters
         ----------

@@ -130,8 +130,8 @@ class TiedFilaments(AddedFilaments):
 
         Half a segment of material is between the frame and that of the last segment: a joint with the stiffness 2C/l0
         against twist, which does not bend. So an end that is held keeps its turns, whatever the filament does, and the
-        linking number of a filament that is held at both ends is kept, if clamped nodes, tethers or a pull keep its ends
-        near to the directions. An end without a frame is free.
+        linking number of a filament that is held at both ends is kept, if clamped nodes or forces keep its ends near to
+        the directions. An end without a frame is free.
 
         Parameters
         ----------

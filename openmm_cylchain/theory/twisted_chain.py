@@ -62,9 +62,7 @@ class TwistedChain:
     effective_torsional_rigidity: float
 
 
-def twisted_chain(
-    filament_type: FilamentType, force: Scalar, torque: Scalar, temperature: Scalar
-) -> TwistedChain:
+def twisted_chain(filament_type: FilamentType, force: Scalar, torque: Scalar, temperature: Scalar) -> TwistedChain:
     """Extension, writhe and turns of a long discrete chain that is pulled and turned; for small angles.
 
     Bends of the discrete chain with inextensible segments, to the second order: with K the stiffness of a joint, and
@@ -115,7 +113,7 @@ def twisted_chain(
 
 
 def critical_torque(filament_type: FilamentType, force: Numbers) -> FloatOrArray:
-    """Torque beyond which a long straight chain under tension is not stable: ``(4 K l0 f + (f l0)^2)^(1/2)``, in kJ/mol.
+    """Torque ``(4 K l0 f + (f l0)^2)^(1/2)`` beyond which a long straight chain under tension is not stable, in kJ/mol.
 
     Parameters
     ----------
