@@ -397,6 +397,50 @@ def test_writhe_of_rings_follows_from_that_of_rings_without_twist(step):
     assert mean < 0.9 * means[UNTWISTED].mean()
 
 
+# Instabilities without noise
+
+
+@pytest.mark.parametrize(("share", "grows"), [(0.97, False), (1.03, True)])
+def test_ring_buckles_beyond_so_many_turns(share, grows):
+    """sqrt(3) A/C, of a ring with 60 segments."""
+    generator = np.random.default_rng(1)
+    filaments = Filaments(VISCOSITY / 100, 0.0)
+    filaments.add_ring(DNA, 60, [0, 0, 0])
+    context, own = in_context(filaments, 2e4)
+    context.setPositions(positions_of(context) + generator.normal(0.0, 1e-3, (60, 3)))
+    own.set_twists(0, np.full(60, 2 * np.pi * share * theory.ring_buckling_turns(DNA) / 60))
+    heights = []
+    # Other modes decay first.
+    for steps in (150, 200):
+        context.getIntegrator().step(steps)
+        nodes = positions_of(context)
+        heights.append(np.linalg.svd(nodes - nodes.mean(axis=0), compute_uv=False)[2])
+    assert (heights[1] > 1.2 * heights[0]) == grows and (heights[1] < heights[0] / 1.2) != grows
+
+
+@pytest.mark.parametrize(("share", "grows"), [(0.97, False), (1.03, True)])
+@pytest.mark.parametrize("step", [2e3, 2e4])
+def test_straight_chain_is_unstable_beyond_a_torque(share, grows, step):
+    """The torque in the middle of a long chain that is held straight at its ends."""
+    generator = np.random.default_rng(1)
+    filaments = Filaments(VISCOSITY, 0.0)
+    segments, pull = 200, 0.5 * KT
+    filaments.add_straight(DNA, segments, [0, 0, 0], [0, 0, 1], clamped=[0, 1])
+    filaments.add_end_frame(0, "minus", [0, 0, 1])
+    filaments.add_end_frame(0, "plus", [0, 0, 1])
+    context, own = in_context(filaments, step, pull=pull)
+    positions = positions_of(context)
+    positions[2:-2, :2] += generator.normal(0.0, 1e-4, (segments - 3, 2))
+    context.setPositions(positions)
+    twist = share * theory.critical_torque(DNA, pull) / DNA.twist_stiffness
+    own.set_twists(0, twist * np.array([0.5, *[1] * (segments - 1), 0.5]))
+    sizes = []
+    for time in (1e7, 1e7):
+        context.getIntegrator().step(int(time / step))
+        sizes.append(np.abs(positions_of(context)[20:-20, :2]).max())
+    assert (sizes[1] > 2 * sizes[0]) == grows and (sizes[1] < 0.9 * sizes[0]) != grows
+
+
 # What is compared with
 
 
