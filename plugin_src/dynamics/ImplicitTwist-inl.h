@@ -17,6 +17,9 @@
 /** Whether there are packs with twist: in double precision alone. */
 constexpr bool HAS_TWIST = sizeof(Scalar) == sizeof(double);
 
+/** By this much, nodes may give way to the torque that all of a chain shares without its being in their equations. */
+const Scalar NEARLY_RIGID = 0.1;
+
 /** The angle of a complex number x+iy, in (-pi, pi). */
 template <class Real> CYLCHAIN_INLINE Real argument(Real x, Real y) {
     const Real tangent = y/x, square = tangent*tangent;
@@ -106,17 +109,25 @@ public:
      *
      * @param iteration  how many there were before; the first one finds how far nodes give way, for all
      */
-    template <class Equations> void shareTorque(Equations& equations, int iteration) const {
+    template <class Equations> void shareTorque(Equations& equations, int iteration) {
         Vec* const response = step.gradient+step.n;
         Vec* const forces = response+step.n;
         if (iteration == 0)
             equations.respond(step.gradient, response);
+        else if (!givesWay)
+            return;
         Real found = Real{}, own = Real{};
         for (int node = 0; node < step.n; node++) {
             found = found+step.gradient[node].dot(step.change[node]);
             own = own+step.gradient[node].dot(response[node]);
         }
-        const Real share = -shared*found/(1+shared*own);
+        own = shared*own;
+        givesWay = false;
+        for (int i = 0; i < W; i++)
+            givesWay |= lane(own, i) > NEARLY_RIGID;
+        if (!givesWay)
+            return;
+        const Real share = -shared*found/(1+own);
         for (int node = 0; node < step.n; node++)
             forces[node] = step.gradient[node]*share;
         equations.addForces(forces);
@@ -154,6 +165,8 @@ private:
     Vec directions[2];
     /** The sum of torques when each twist changes by one; and in rings, what the elimination needs. */
     Real shared, corner, perCorner;
+    /** Whether the nodes of any chain give way to its torque by so much that their equations need it. */
+    bool givesWay = true;
 
     /** The segment before a joint, or at the first end of an open chain, the one behind it. */
     int before(int s) const {
