@@ -48,6 +48,7 @@ from .filaments.presets import ACTIN_AGING, ACTIN_ATP, DSDNA, F_ACTIN, MDIA1_END
 from .filaments.segment_place import SegmentPlace
 from .filaments.severing import Severing
 from .filaments.shapes import FilamentOptions
+from .filaments.twist import EndFrame
 from .kinetics.barrier import Barrier
 from .kinetics.binding_range import BindingRange
 from .kinetics.branching import Branching
@@ -75,6 +76,7 @@ from .time_steps.time_step import TimeStep, effective_rate
 from .version import __version__
 
 __all__ = [
+    "EndFrame",
     "HandAtEnd",
     "Branching",
     "TwoUnitCap",

@@ -26,6 +26,7 @@ from .filament_shapes import (
     segment_lengths,
     tangents,
 )
+from .linking import linking_number, writhe
 from .loops import ContactProbability, contact_counts, contact_probability, loop_lengths
 from .moduli import RelaxationModulus, relaxation_modulus
 from .networks import contact_map, contraction, filament_distances, find_bundles, mesh_size
@@ -66,6 +67,7 @@ __all__ = [
     "find_bundles",
     "find_crossings",
     "joint_cosines",
+    "linking_number",
     "load",
     "loop_lengths",
     "mean_square_displacement",
@@ -83,4 +85,5 @@ __all__ = [
     "stress",
     "tangent_correlation",
     "tangents",
+    "writhe",
 ]

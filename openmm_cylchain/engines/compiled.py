@@ -11,6 +11,7 @@ import openmm
 
 from ..engine_choice import why_openmm_differs
 from ..errors import InputError, InstabilityError, instability_in_force, note_raised_in_force
+from ..filaments.twist import has_twist
 from ..kinetics.binding_force import find_binding_force, make_binding_force
 from ..kinetics.growth_force import make_growth_force
 from ..mechanics.flow import Flow, as_flow
@@ -24,6 +25,7 @@ from ..time_steps.schemes import SCHEMES as ALL_SCHEMES
 from ..time_steps.step_watch import DividedSteps, ExplicitWork
 from ..time_steps.time_step import as_step
 from ..units.quantities import TEMPERATURE, non_negative, whole_number
+from .compiled_twist import set_end_frame, set_twists_of, twists_of
 from .description import (
     advice_after_blow_up,
     filament_label,
@@ -90,6 +92,7 @@ class CompiledEngine(Engine):
     has_growth = True
     has_beam_elements = True
     has_bodies = True
+    has_twist = True
 
     def add_forces(self, system, placed, stretching_force_group, bending_force_group):
         """Add one CylinderChainForce, with one force group for stretching and bending."""
@@ -107,6 +110,8 @@ class CompiledEngine(Engine):
                 controls = placed.control_point_indices[number]
                 _add_beam_chain(force, filament, nodes, controls, placed.viscosity, placed.temperature)
             force.setChainName(number, filament_label(number, filament))
+        for frame in placed.end_frames:
+            set_end_frame(force, placed.filaments[frame.filament], frame)
         for tether in placed.tethers:
             force.addTether(tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
         for body, particles in zip(placed.bodies, placed.body_indices):
@@ -161,6 +166,14 @@ class CompiledEngine(Engine):
                 _set_tethers(force, tethers)
                 force.updateParametersInContext(context)
                 _set_tethers(force, {number: placed.tethers[number] for number in tethers})
+
+    def twists(self, context, filament):
+        """Those that the Context has."""
+        return twists_of(context, filament)
+
+    def set_twists(self, context, filament, twists):
+        """Others, of as many joints."""
+        set_twists_of(context, filament, twists)
 
     def record_tensions(self, context):
         """See ``NativeIntegrator.setRecordsTensions``."""
@@ -240,8 +253,12 @@ def _add_chain(force, filament, nodes, viscosity, temperature):
     force.setChainPlanar(chain, filament.planar)
     for segment in range(filament.segments if filament.propulsion else 0):
         force.setSegmentPropulsion(chain, segment, filament.propulsion)
-    for joint, stiffness in enumerate(filament.joint_stiffnesses):
+    stiffnesses = filament.joint_stiffnesses
+    for joint, stiffness in enumerate(stiffnesses):
         force.setJointParameters(chain, joint, float(stiffness))
+    if has_twist(kind):
+        joints, axial = len(stiffnesses), kind.axial_friction(viscosity)
+        force.setChainTwist(chain, [kind.twist_stiffness] * joints, [0.0] * joints, [axial] * filament.segments)
 
 
 def _add_body(force, placed, particles, viscosity):

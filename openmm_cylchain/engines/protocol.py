@@ -9,6 +9,7 @@ import openmm
 
 from ..filaments.body import PlacedBody
 from ..filaments.filament import Filament, Tether
+from ..filaments.twist import EndFrame
 from ..kinetics.barrier import Barrier
 from ..kinetics.linkers import Linkers
 from ..mechanics.flow import Flow
@@ -42,6 +43,8 @@ class PlacedFilaments:
         In nm, of the System, while forces are added; empty later.
     barriers : tuple of Barrier
         On filaments, for hands of linkers.
+    end_frames : tuple of EndFrame
+        As they were added; those of a Context may have changed.
     """
 
     filaments: tuple[Filament, ...]
@@ -56,6 +59,7 @@ class PlacedFilaments:
     body_indices: tuple[np.ndarray, ...] = ()
     positions: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     barriers: tuple[Barrier, ...] = ()
+    end_frames: tuple[EndFrame, ...] = ()
 
     @property
     def nodes(self) -> np.ndarray:
@@ -106,6 +110,9 @@ class Engine(ABC):
     has_bodies = False
     """Whether it moves rigid bodies."""
 
+    has_twist = False
+    """Whether it moves filaments with twist."""
+
     @abstractmethod
     def add_forces(
         self, system: openmm.System, placed: PlacedFilaments, stretching_force_group: int, bending_force_group: int
@@ -129,6 +136,14 @@ class Engine(ABC):
     @abstractmethod
     def set_tethers(self, context: openmm.Context, placed: PlacedFilaments, tethers: dict[int, Tether]) -> None:
         """Give a Context other tethers, by their numbers, and those of the description for the rest."""
+
+    def twists(self, context: openmm.Context, filament: int) -> np.ndarray:
+        """Twists (joints,) in radians of a filament with twist, with those to the frames beyond its ends."""
+        raise NotImplementedError
+
+    def set_twists(self, context: openmm.Context, filament: int, twists: np.ndarray) -> None:
+        """Give a filament with twist in a Context other twists."""
+        raise NotImplementedError
 
     @abstractmethod
     def record_tensions(self, context: openmm.Context) -> None:

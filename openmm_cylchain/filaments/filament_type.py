@@ -23,6 +23,7 @@ from ..units.quantities import (
     STIFFNESS,
     TEMPERATURE,
     TIME,
+    VISCOSITY,
     in_units_of,
     numbers_to_compute_with,
     one_of,
@@ -98,6 +99,11 @@ class FilamentType(ChainType):
     contour_per_segment : length, optional
         Length of the continuous filament that a segment stands for, if it is not segment_length:
         ``theory.calibrated_to_force`` makes such types.
+    twist_persistence_length : length with temperature : temperature
+        The length l_t = C/k_B T over which twist is lost: the frames of two places of the free filament at a distance s
+        along it have ``<cos(turn)> = exp(-s/2 l_t)``. Without it, and without a torsional rigidity, there is no twist.
+    torsional_rigidity : energy*length
+        Instead of it: C of the twist energy (C/2 l0) m^2 of a joint with the twist m in radians. See Notes.
     mass_per_length : mass/length
         Only for the relaxation times of momenta, eq. (51), and for the masses that OpenMM asks for:
         the dynamics is overdamped and does not depend on it.
@@ -117,6 +123,11 @@ class FilamentType(ChainType):
     persistence length, EI is such that tangents of neighbouring nodes have ``<t.t'> = exp(-l0/l_p)`` in space: less
     than l_p k_B T, by 1 % where an element is a tenth of l_p long, and by 3 % where it is a quarter. The compiled
     engine alone has them, with scheme "implicit".
+
+    Twist is for straight segments of open filaments and rings in space, with scheme "implicit" of the compiled engine.
+    Each segment has a material frame, which turns about the segment against the friction 4 pi eta (d/2)^2 l0 of a
+    cylinder; m is the angle between two of them beyond parallel transport. The filament is isotropic and not twisted at
+    rest. What holds frames at its ends is added by ``Filaments.add_end_frame``.
 
     A type keeps the persistence length as ``bending_rigidity`` a = l_p k_B T, the rigidity of the continuous filament,
     with the ``temperature``: the two together mean the same as l_p = a/k_B T with the temperature. So
@@ -141,6 +152,8 @@ class FilamentType(ChainType):
     mass_per_length: float = 3500.0
     element: str = "straight"
     contour_per_segment: float | None = None
+    torsional_rigidity: float | None = None
+    twist_persistence_length: float | None = field(default=None, repr=False)
 
     if TYPE_CHECKING:  # What may be given; the attributes hold plain numbers.
 
@@ -165,6 +178,8 @@ class FilamentType(ChainType):
             mass_per_length: Scalar = 3500.0,
             element: str = "straight",
             contour_per_segment: Scalar | None = None,
+            torsional_rigidity: Scalar | None = None,
+            twist_persistence_length: Scalar | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -193,6 +208,7 @@ class FilamentType(ChainType):
             if getattr(self, attribute) is None:
                 self._fail(f"{attribute} must be given{usual}.")
         self._resolve_bending()
+        self._resolve_twist()
         if (self.stretching_stiffness is None) == (self.stretching_modulus is None):
             self._fail("give either stretching_stiffness (of one segment) or stretching_modulus (EA).")
         if self.extension_relaxation_time is not None and self.extensional_friction is not None:
@@ -225,6 +241,24 @@ class FilamentType(ChainType):
         self._check_magnitude("bending_rigidity", rigidity)
         self._set("bending_rigidity", rigidity)
         self._set("persistence_length", None)
+
+    def _resolve_twist(self):
+        name = f"of filament type {self.name!r}"
+        if self.torsional_rigidity is not None and self.twist_persistence_length is not None:
+            self._fail("give either torsional_rigidity or twist_persistence_length (with its temperature).")
+        if self.torsional_rigidity is not None:
+            rigidity = positive(self.torsional_rigidity, BENDING_RIGIDITY, f"torsional_rigidity {name}")
+        elif self.twist_persistence_length is not None:
+            if self.temperature is None:
+                self._fail("twist_persistence_length needs the temperature at which it holds.")
+            length = positive(self.twist_persistence_length, LENGTH, f"twist_persistence_length {name}")
+            rigidity = length * thermal_energy(self.temperature)
+        else:
+            return
+        self._refuse_beam("twist")
+        self._check_magnitude("torsional_rigidity", rigidity)
+        self._set("torsional_rigidity", rigidity)
+        self._set("twist_persistence_length", None)
 
     def _check_magnitude(self, attribute, value):
         # Powers of what is beyond are not finite.
@@ -312,6 +346,24 @@ class FilamentType(ChainType):
             return self.bending_rigidity / length
         kT = thermal_energy(self.temperature)
         return kT * calibrated_stiffness(self.bending_model, length * kT / self.bending_rigidity)
+
+    @property
+    def twist_stiffness(self) -> float:
+        """Stiffness C/l0 of one joint against twist in kJ/mol; InputError if the type has no twist."""
+        if self.torsional_rigidity is None:
+            self._fail("it has no twist: give it a torsional_rigidity or a twist_persistence_length.")
+        return cast(float, self.torsional_rigidity) / self.segment_length
+
+    def axial_friction(self, viscosity: Scalar) -> float:
+        """Friction 4 pi eta (d/2)^2 l0 of one segment against turning about itself, in kJ ps/mol.
+
+        Parameters
+        ----------
+        viscosity : pressure*time
+            A plain number is in kJ ps/(mol nm^3), 602214 of which are 1 Pa s.
+        """
+        viscosity = positive(viscosity, VISCOSITY, "viscosity")
+        return float(np.pi * viscosity * self.diameter**2 * self.segment_length)
 
     @property
     def segment_mass(self) -> float:

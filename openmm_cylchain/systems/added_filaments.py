@@ -17,7 +17,9 @@ from ..filaments.chain_type import ChainType
 from ..filaments.filament import Filament
 from ..filaments.filament_type import FilamentType
 from ..filaments.growth import Growth
+from ..filaments.growth_refusals import growth_refusal
 from ..filaments.shapes import FilamentOptions
+from ..filaments.twist import has_twist
 from ..kinetics.nucleation import Nucleation, require_nucleation
 from ..units.quantities import TEMPERATURE, VISCOSITY, non_negative, positive, shown, true_or_false, whole_number
 from ..units.types import IntArray, Scalar, Vector, Vectors
@@ -321,6 +323,7 @@ class AddedFilaments:
             )
         require_nucleation(nucleation)
         filament = shapes.reserve_filament(filament_type, label, growth, nucleation, planar, propulsion)
+        self._check_twist(filament, label)
         if nucleation is not None and isinstance(filament_type, FilamentType):
             try:
                 nucleation.monomers(growth, filament_type)
@@ -384,6 +387,16 @@ class AddedFilaments:
             )
         return f"Filament {len(self)} ({filament_type.name})"
 
+    def _check_twist(self, filament, label):
+        if not has_twist(filament.type):
+            return
+        if not self._engine.has_twist:
+            raise InputError(f"{label}: the {self._engine_name} engine has no twist: use the compiled one.")
+        if filament.planar:
+            raise InputError(f"{label} is planar, and cannot have twist.")
+        if filament.growth is not None:
+            raise InputError(growth_refusal(label, "twist"))
+
     def _add(self, filament_type, points, label, closed, options):
         self._refuse_if_built(label)
         if not (filament_type.segment_kind.straight or self._engine.has_beam_elements):
@@ -393,6 +406,7 @@ class AddedFilaments:
                 f"{label}: the {self._engine_name} engine has no filaments that grow: use the compiled one."
             )
         filament = shapes.new_filament(filament_type, points, label, closed, **options)
+        self._check_twist(filament, label)
         # Friction is computed now, so that a filament that has none is refused here.
         try:
             filament_type.segment_friction(self._viscosity, self._temperature, filament.segments)

@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..kinetics.binding_force import find_binding_force
 from ..kinetics.growth_force import find_growth_force
 
-_PARAMETERS, _LINKERS, _GROWTH = "IntegratorParameters", "linkers", "growth"
+_PARAMETERS, _LINKERS, _GROWTH, _TWISTS = "IntegratorParameters", "linkers", "growth", "twists"
 
 
 class StateColumns:
@@ -43,8 +43,8 @@ def carry_state(
 ) -> None:
     """Bring a Context into the state of another one.
 
-    Positions, time, the count of steps, by which noise is drawn, what has grown and linkers go on; flow, crosslinks and
-    where tethers are stay as they are.
+    Positions, time, the count of steps, by which noise is drawn, what has grown, twists and linkers go on; flow,
+    crosslinks and where tethers are stay as they are.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def carry_state(
     parameters = tree.find(_PARAMETERS)
     assert parameters is not None
     for child in list(parameters):
-        if child.tag not in (_LINKERS, _GROWTH):
+        if child.tag not in (_LINKERS, _GROWTH, _TWISTS):
             parameters.remove(child)
     linkers, growth = (parameters.find(name) for name in (_LINKERS, _GROWTH))
     if linkers is not None and change_linkers is not None:

@@ -19,6 +19,7 @@ from ..errors import InputError
 from ..filaments.attachments import add_virtual_site, attachment_positions, neighbors
 from ..filaments.beam_refusals import refuse_beams
 from ..filaments.growth_refusals import refuse_growth
+from ..filaments.twist import refuse_twist
 from ..kinetics.linkers import refuse_barriers_without_linkers, refuse_linkers_without_volume
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.redistribution import ChainSet
@@ -391,6 +392,7 @@ class Filaments(TiedFilaments):
         refuse_linkers_without_volume(self.linkers, system)
         if scheme != "implicit":
             refuse_beams(self, f"scheme {scheme!r}")
+            refuse_twist(self, f"scheme {scheme!r}")
         CoupledForces(system).refuse_in_two_stages(scheme)
         bath = self._bath(temperature)
         if true_or_false(checks, "checks"):

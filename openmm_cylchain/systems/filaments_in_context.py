@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..filaments.beam_refusals import refuse_beams
 from ..filaments.filament import Tether
 from ..filaments.growth_refusals import refuse_growth
+from ..filaments.twist import end_number, has_twist, refuse_twist
 from ..kinetics.binding_force import (
     find_binding_force,
     naming_unknown_linkers,
@@ -30,9 +31,11 @@ from ..kinetics.linkers import LinkerPulls
 from ..mechanics.flow import Flow
 from ..mechanics.tension import components_along, filament_tensions
 from ..units.quantities import (
+    ANGLE,
     FORCE,
     LENGTH,
     STIFFNESS,
+    finite_number,
     in_units_of,
     positive,
     require_kind,
@@ -203,6 +206,7 @@ class FilamentsInContext:
         """
         filaments, nodes = self._placed.filaments, self._placed.node_indices
         refuse_beams(filaments, "instantaneous tensions of joints")
+        refuse_twist(filaments, "instantaneous tensions of joints")
         refuse_growth(filaments, "instantaneous tensions of joints", "Ask for mean_joint_tensions.")
         state = self._context.getState(positions=True, forces=True)
         positions = state.getPositions(asNumpy=True)._value
@@ -278,7 +282,81 @@ class FilamentsInContext:
             With the portable engine or an explicit scheme.
         """
         refuse_beams(self._placed.filaments, "records of mean tensions")
+        refuse_twist(self._placed.filaments, "records of mean tensions")
         self._engine.record_tensions(self._context)
+
+    def twists(self, filament: int) -> unit.Quantity:
+        """Twists of a filament: the angle of the material frames of neighbouring segments beyond parallel transport.
+
+        They are followed in time and not wrapped, so no turn is lost. A Context begins with zero. Checkpoints and
+        States with ``integratorParameters=True`` hold them; setting positions does not change them.
+
+        Parameters
+        ----------
+        filament : int
+
+        Returns
+        -------
+        (segments + 1,) Quantity in radians
+            The first is between the frame beyond the minus end and the first segment, the last between the last segment
+            and the frame beyond the plus end, and those of joints are between these. Where an end is free, or its frame
+            turns freely, its twist says how far the segment there has turned since the start. A ring has as many as
+            segments; the first is that at node 0.
+
+        Raises
+        ------
+        InputError
+            For a filament that does not exist or has no twist.
+        """
+        return self._engine.twists(self._context, self._twisted(filament)) * unit.radian
+
+    def set_twists(self, filament: int, twists: npt.ArrayLike) -> None:
+        """Give a filament other twists, such as those of another run, or of a ring that is closed with some turns.
+
+        Parameters
+        ----------
+        filament : int
+        twists : array of angles
+            As ``twists`` returns them; radians if plain numbers.
+        """
+        number = self._twisted(filament)
+        values = np.asarray(in_units_of(twists, ANGLE, "twists"))
+        count = len(self._engine.twists(self._context, number))
+        if values.shape != (count,):
+            raise InputError(f"twists must have the shape ({count},), but have {values.shape}.")
+        self._engine.set_twists(self._context, number, values)
+
+    def turn_end(self, filament: int, end: str, angle: Scalar) -> None:
+        """Turn the frame that holds an end of a filament, at once: turn it by little between steps.
+
+        Parameters
+        ----------
+        filament : int
+        end : {"minus", "plus"}
+        angle : angle
+            About the direction of the frame, counter-clockwise as seen from where it points; radians if a plain number.
+
+        Raises
+        ------
+        InputError
+            If the end has no frame that is held.
+        """
+        number = self._twisted(filament)
+        side = end_number(end, "turn_end: end")
+        frames = [own for own in self._placed.end_frames if (own.filament, own.end) == (number, end)]
+        if not frames or frames[0].torque is not None:
+            raise InputError(f"The {end} end of filament {number} has no frame that is held: add it by add_end_frame.")
+        twists = self._engine.twists(self._context, number)
+        twists[-1 if side else 0] += finite_number(angle, ANGLE, "angle") * (1 if side else -1)
+        self._engine.set_twists(self._context, number, twists)
+
+    def _twisted(self, filament):
+        number, count = whole_number(filament, 0, "filament"), len(self._placed.filaments)
+        if number >= count:
+            raise InputError(f"Filament {number} does not exist; there are {count}.")
+        if not has_twist(self._placed.filaments[number].type):
+            raise InputError(f"Filament {number} has no twist: give its type a twist_persistence_length.")
+        return number
 
     def flow(self) -> Flow:
         """The Flow of the solvent, at rest where the integrator knows of none."""

@@ -45,6 +45,7 @@ from ..errors import InputError, InstabilityError
 from ..filaments.collection import require_filaments
 from ..filaments.growth_refusals import refuse_growth
 from ..filaments.placement import refuse_coinciding
+from ..filaments.twist import refuse_twist
 from ..kinetics.binding_force import find_binding_force
 from ..mechanics.flow import Flow
 from ..mechanics.geometry import segment_vectors
@@ -157,6 +158,7 @@ def check_time_step(
     """
     require_filaments(filaments)
     refuse_growth(filaments, "the check of a step, which compares the same nodes in two runs,")
+    refuse_twist(filaments, "the check of a step")
     require_kind(system, openmm.System, "system")
     positions = np.asarray(in_units_of(positions, LENGTH, "positions"))
     if positions.shape != (system.getNumParticles(), 3):

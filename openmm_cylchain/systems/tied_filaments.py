@@ -16,6 +16,7 @@ from ..filaments.filament import Tether
 from ..filaments.growth_refusals import growth_refusal
 from ..filaments.placement import named_nodes
 from ..filaments.segment_place import SegmentPlace
+from ..filaments.twist import EndFrame, has_twist
 from ..kinetics.barrier import Barrier, as_barrier
 from ..kinetics.crosslinker import Crosslinker
 from ..kinetics.first_places import contour_of
@@ -33,6 +34,7 @@ class TiedFilaments(AddedFilaments):
         super().__init__(viscosity, temperature, engine)
         self._tethers: list[Tether] = []
         self._tethered_nodes: set[tuple[int, int]] = set()
+        self._end_frames: list[EndFrame] = []
         self._linkers: list[Linkers] = []
         self._barriers: list[Barrier] = []
         # For so many filaments: the linkers of the joints of their branches.
@@ -48,6 +50,11 @@ class TiedFilaments(AddedFilaments):
     def tethers(self) -> tuple[Tether, ...]:
         """Tuple of the tethers as they were added, in order of their numbers; see ``FilamentsInContext.tethers``."""
         return tuple(self._tethers)
+
+    @property
+    def end_frames(self) -> tuple[EndFrame, ...]:
+        """Tuple of the frames beyond ends of filaments, as they were added."""
+        return tuple(self._end_frames)
 
     @property
     def attachments(self) -> tuple[Attachment, ...]:
@@ -109,6 +116,59 @@ class TiedFilaments(AddedFilaments):
         self._tethers.append(Tether(filament, node, (x, y, z), stiffness))
         self._tethered_nodes.add((filament, node))
         return len(self._tethers) - 1
+
+    def add_end_frame(
+        self,
+        filament: int,
+        end: str,
+        direction: Vector,
+        *,
+        torque: Scalar | None = None,
+        angular_velocity: Scalar = 0.0,
+    ) -> None:
+        """Bind the material at an end of a filament with twist to a frame beyond it, such as that of a magnetic bead.
+
+        Half a segment of material is between the frame and that of the last segment: a joint with the stiffness 2C/l0
+        against twist, which does not bend. So an end that is held keeps its turns, whatever the filament does, and the
+        linking number of a filament that is held at both ends is kept, if clamped nodes or forces keep its ends near to
+        the directions. An end without a frame is free.
+
+        Parameters
+        ----------
+        filament : int
+            The filament's number.
+        end : {"minus", "plus"}
+            That of the first node, or that of the last.
+        direction : (3,) array
+            From minus to plus, where the filament would go on beyond its plus end, or has come from at its minus end.
+            It does not change, and need not be normalised.
+        torque : energy, optional
+            A torque about the direction on a frame that turns freely about it. The frame is held if none is given.
+        angular_velocity : angle/time
+            How fast a frame that is held turns about the direction; radians/ps if a plain number.
+
+        Raises
+        ------
+        InputError
+            For a filament or an end that does not exist, a ring, a filament without twist, or a second frame.
+
+        Examples
+        --------
+        >>> filaments.add_end_frame(0, "minus", [0, 0, 1])  # doctest: +SKIP
+        >>> filaments.add_end_frame(0, "plus", [0, 0, 1], torque=8 * unit.piconewton * unit.nanometer)  # doctest: +SKIP
+        """
+        label = f"End frame {len(self._end_frames)}"
+        self._refuse_if_built(label)
+        number = self._filament_number(filament, label)
+        own = self[number]
+        if not has_twist(own.type):
+            raise InputError(f"{label}: filament {number} has no twist: give its type a twist_persistence_length.")
+        if own.closed:
+            raise InputError(f"{label}: filament {number} is a ring, and has no ends.")
+        frame = EndFrame(number, end, direction, torque, angular_velocity)  # type: ignore[arg-type]
+        if any(other.filament == number and other.end == end for other in self._end_frames):
+            raise InputError(f"{label}: the {end} end of filament {number} has a frame already.")
+        self._end_frames.append(frame)
 
     def add_attachment(
         self, filament: int, arc_length: Scalar | None = None, segment: int | None = None, fraction: float | None = None
@@ -409,4 +469,5 @@ class TiedFilaments(AddedFilaments):
             tuple(self._bodies),
             tuple(self.body_indices),
             barriers=tuple(self._barriers),
+            end_frames=tuple(self._end_frames),
         )

@@ -59,6 +59,14 @@ from .free_segment import (
     mean_orientation,
     short_time_mean_square_displacement,
 )
+from .twisted_chain import (
+    TwistedChain,
+    chain_mean_turn_cosine,
+    chain_twist_variance,
+    critical_torque,
+    ring_buckling_turns,
+    twisted_chain,
+)
 from .wormlike_chain import (
     bending_mode_variance,
     clamped_angle_variance,
@@ -68,6 +76,7 @@ from .wormlike_chain import (
 )
 
 __all__ = [
+    "TwistedChain",
     "bead_spring_bending_energies",
     "bead_spring_bond_correlations",
     "bead_spring_mean_lengths",
@@ -93,11 +102,14 @@ __all__ = [
     "chain_mean_energies",
     "chain_mean_square_end_to_end",
     "chain_mean_square_radius_of_gyration",
+    "chain_mean_turn_cosine",
     "chain_persistence_length",
     "chain_planar_bending_mode_variance",
     "chain_tangent_correlation",
+    "chain_twist_variance",
     "clamped_angle_variance",
     "clamped_deflection_variance",
+    "critical_torque",
     "crossover_force",
     "effective_spring_constant",
     "free_segment_mean_square_displacement",
@@ -110,9 +122,11 @@ __all__ = [
     "marko_siggia_spring_constant",
     "mean_joint_cosine",
     "mean_orientation",
+    "ring_buckling_turns",
     "short_time_mean_square_displacement",
     "stretching_energy_mean",
     "stretching_energy_variance",
+    "twisted_chain",
     "wlc_mean_square_end_to_end",
     "wlc_relative_extension",
     "wlc_share_of_force",

@@ -76,7 +76,7 @@ ChainEngine::ChainEngine(const vector<Chain>& chains, const vector<PieceOfChain>
     stable_sort(order.begin(), order.end(), [&] (int a, int b) {
         auto key = [&] (const Chain& chain) {
             return make_tuple(-(int) chain.nodes.size(), chain.bending, chain.stretching, chain.closed, chain.planar,
-                    chain.nodeFriction > 0);
+                    chain.nodeFriction > 0, chain.twist.isPresent());
         };
         return key(chains[a]) < key(chains[b]);
     });
@@ -104,7 +104,7 @@ ChainEngine::ChainEngine(const vector<Chain>& chains, const vector<PieceOfChain>
             if (lanes > bestKernels().wide.lanes || !mayShareLanes(longest, chains[members[last].back()]))
                 break;
         }
-        if (!longest.closed && !hasRange(longest.stretching))
+        if (!longest.closed && !hasRange(longest.stretching) && !longest.twist.isPresent())
             implementation->wide.push_back(implementation->widePackOf(chains, first, last));
     }
     if (mayChange)

@@ -86,6 +86,12 @@ struct StepSettings {
      */
     std::vector<std::vector<SegmentForces> >* segmentForces = NULL;
     Precision precision = Precision::Double;
+    /**
+     * The twists of each chain of the engine at the start of the step, and where to write how much they change; NULL if
+     * no chain has any. Scheme Implicit alone has them.
+     */
+    std::vector<std::vector<double> >* twists = NULL;
+    std::vector<std::vector<double> >* twistChanges = NULL;
     /** Whether chains whose implicit step fails take it in parts; otherwise it has failed. */
     bool mayDivide = true;
 };

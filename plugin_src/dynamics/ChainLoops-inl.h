@@ -45,6 +45,7 @@ typedef ChainPack<Scalar> Pack;
 #include "dynamics/ImplicitNoise-inl.h"
 #include "dynamics/ImplicitPositions-inl.h"
 #include "dynamics/SegmentEquations-inl.h"
+#include "dynamics/ImplicitTwist-inl.h"
 #include "dynamics/ImplicitEquations-inl.h"
 #include "dynamics/MetricForces-inl.h"
 #include "dynamics/ImplicitTensions-inl.h"

@@ -13,6 +13,24 @@ struct LaneTether : Tether {
     int lane, number;
 };
 
+/** Twist of the chains of a pack, all of which have the same number of segments. See ChainTwist. */
+template <class Scalar> struct PackTwist {
+    /**
+     * Of the joint at each node, [node][lane]: the stiffness, the angle at rest, how fast it is turned, and a torque that
+     * is there in any case. The last two are those of end frames.
+     */
+    std::vector<Scalar> stiffness, rest, angularVelocity, torque;
+    /** Of each segment, [segment][lane]; nothing if chains have no twist. */
+    std::vector<Scalar> friction;
+    /** The directions of end frames, [end][axis][lane]. */
+    std::vector<Scalar> directions;
+    /** Whether any chain is held at both ends, or is closed, so that all of it shares a torque. */
+    bool isHeld = false;
+    bool isPresent() const {
+        return !friction.empty();
+    }
+};
+
 /** What packs of the same chains have in common in each precision. */
 struct PackShape {
     /** The number of nodes includes those that come twice; that of segments does not. */
@@ -68,6 +86,7 @@ template <class Scalar> struct ChainPack : PackShape {
     std::vector<int> firstTethers;
     /** Half the propulsion of each segment, [segment][lane], or nothing if there is none. */
     std::vector<Scalar> propulsions;
+    PackTwist<Scalar> twist;
     /** Nodes that do not come twice. */
     int ownNodes() const {
         return closed ? nodes-2 : nodes;

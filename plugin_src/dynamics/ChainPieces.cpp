@@ -132,7 +132,7 @@ double ChainPieces::costOf(const PieceLayout& layout, int chains, int lanes) {
 bool ChainPieces::mayBeUsed(const vector<Chain>& chains, const vector<int>& members, int wideLanes) {
     const Chain& longest = chains[members[0]];
     const int nodes = longest.nodes.size(), count = members.size();
-    return !longest.closed &&
+    return !longest.closed && !longest.twist.isPresent() &&
             LEAST_GAIN*costOf(layoutFor(nodes, count, LEAST_SHARED, wideLanes), count, wideLanes) <= nodes;
 }
 

@@ -33,13 +33,44 @@ private:
     std::vector<std::vector<SegmentForces> > part;
 };
 
-/** Where a step would begin if its nodes had moved already. */
+/** The number of joints that can be twisted, with the first one of rings, which comes twice. */
+inline int numTwists(const Pack& pack) {
+    return pack.twist.isPresent() ? pack.segments+1 : 0;
+}
+
+/** Bring twists into lanes, less those at rest. */
+template <int W> void gatherTwists(const Pack& pack, const StepSettings& settings, typename Lanes<W>::Type* twists) {
+    typedef typename Lanes<W>::Type Real;
+    for (int node = 0; node < numTwists(pack); node++) {
+        Real rest = loaded<Real>(pack.twist.rest, node);
+        for (int i = 0; i < W; i++)
+            lane(twists[node], i) = pack.chain[i] < 0 ? 0 :
+                    (*settings.twists)[pack.chain[i]][pack.closed ? node%pack.segments : node]-lane(rest, i);
+    }
+}
+
+/** Write how much the twists of some lanes change. */
+template <int W> void scatterTwists(const Pack& pack, const StepSettings& settings,
+            const typename Lanes<W>::Type* changes, const bool* taken) {
+    typedef typename Lanes<W>::Type Real;
+    for (int node = pack.closed ? 1 : 0; node < numTwists(pack); node++) {
+        Real change = changes[node];
+        for (int i = 0; i < W; i++)
+            if (pack.chain[i] >= 0 && (taken == NULL || taken[i]))
+                (*settings.twistChanges)[pack.chain[i]][pack.closed ? node%pack.segments : node] = lane(change, i);
+    }
+}
+
+/** Where a step would begin if its nodes had moved already, and its twists changed. */
 template <int W> void moveStart(const Pack& pack, const StepStart<W>& start,
-            const Vector<typename Lanes<W>::Type>* moved, bool needsNodes, const StepStart<W>& result) {
+            const Vector<typename Lanes<W>::Type>* moved, const typename Lanes<W>::Type* turned, bool needsNodes,
+            const StepStart<W>& result) {
     for (int node = 0; needsNodes && node < pack.nodes; node++)
         result.nodes[node] = start.nodes[node]+moved[node];
     for (int s = 0; s < pack.nodes-1; s++)
         result.segments[s] = start.segments[s]+(moved[s+1]-moved[s]);
+    for (int node = 0; node < numTwists(pack); node++)
+        result.twists[node] = start.twists[node]+turned[node];
     for (std::size_t i = 0; i < pack.tethers.size(); i++) {
         const LaneTether& tether = pack.tethers[i];
         Vector<typename Lanes<W>::Type> change = moved[tether.node];
@@ -51,13 +82,14 @@ template <int W> void moveStart(const Pack& pack, const StepStart<W>& start,
 
 /** Take one step of the scheme that begins from somewhere, and return the number of iterations: see ImplicitStep. */
 template <int W> using TakeStep = int (*)(const Pack& pack, const StepSettings& settings, const StepStart<W>& start,
-        const Vector<typename Lanes<W>::Type>* forces, Vector<typename Lanes<W>::Type>* y, bool* failed);
+        const Vector<typename Lanes<W>::Type>* forces, Vector<typename Lanes<W>::Type>* y, bool* failed,
+        typename Lanes<W>::Type* turned);
 
 template <int W, bool CLOSED> int takeImplicitStep(const Pack& pack, const StepSettings& settings,
             const StepStart<W>& start, const Vector<typename Lanes<W>::Type>* forces,
-            Vector<typename Lanes<W>::Type>* y, bool* failed) {
+            Vector<typename Lanes<W>::Type>* y, bool* failed, typename Lanes<W>::Type* turned) {
     static thread_local typename ImplicitStep<W, CLOSED>::Memory memory;
-    return ImplicitStep<W, CLOSED>(pack, settings, start, memory).take(forces, y, failed);
+    return ImplicitStep<W, CLOSED>(pack, settings, start, memory).take(forces, y, failed, turned);
 }
 
 /**
@@ -66,16 +98,20 @@ template <int W, bool CLOSED> int takeImplicitStep(const Pack& pack, const StepS
  */
 template <int W> void divideStep(TakeStep<W> takeStep, const Pack& pack, const StepStart<W>& start,
             const Vector<typename Lanes<W>::Type>* f, StepSettings settings, Vector<typename Lanes<W>::Type>* y,
-            bool* failed, const int* planned) {
+            bool* failed, typename Lanes<W>::Type* turned, const int* planned) {
     typedef typename Lanes<W>::Type Real;
-    static thread_local Scratch vectors, tethers;
+    static thread_local Scratch vectors, tethers, twists;
     const double h = settings.stepSize;
     const std::uint64_t step = settings.step;
     const int level = settings.level, n = pack.nodes;
     const MeanOfParts<W> mean(pack, settings);
     Vector<Real>* moved = vectors.reserve<Vector<Real> >(4*n);
     Vector<Real>* change = moved+n;
-    const StepStart<W> from = {moved+2*n, moved+3*n, tethers.reserve<TetherVector>(pack.tethers.size())};
+    const int joints = numTwists(pack);
+    Real* const turnedSoFar = twists.reserve<Real>(3*joints);
+    Real* const turnedInPart = turnedSoFar+joints;
+    const StepStart<W> from = {moved+2*n, moved+3*n, tethers.reserve<TetherVector>(pack.tethers.size()),
+            turnedSoFar+2*joints};
     for (int division = 1; division <= LARGEST_DIVISION_OF_CHAIN && level+division <= LARGEST_LEVEL; division++) {
         bool isTried[W], anyIsTried = false;
         for (int i = 0; i < W; i++) {
@@ -90,13 +126,17 @@ template <int W> void divideStep(TakeStep<W> takeStep, const Pack& pack, const S
         bool failedNow[W] = {}, failedPart[W];
         for (int node = 0; node < n; node++)
             moved[node] = Vector<Real> {};
+        for (int joint = 0; joint < joints; joint++)
+            turnedSoFar[joint] = Real{};
         bool hope = true;
         for (int part = 0; part < parts && hope; part++) {
             settings.step = (step<<division)+part;
-            moveStart<W>(pack, start, moved, settings.flow.present, from);
-            takeStep(pack, settings, from, f, change, failedPart);
+            moveStart<W>(pack, start, moved, turnedSoFar, settings.flow.present, from);
+            takeStep(pack, settings, from, f, change, failedPart, turnedInPart);
             for (int node = 0; node < n; node++)
                 moved[node] = moved[node]+change[node];
+            for (int joint = 0; joint < joints; joint++)
+                turnedSoFar[joint] = turnedSoFar[joint]+turnedInPart[joint];
             mean.add(part, parts, isTried);
             hope = false;
             for (int i = 0; i < W; i++) {
@@ -113,6 +153,8 @@ template <int W> void divideStep(TakeStep<W> takeStep, const Pack& pack, const S
                     lane(y[node].y, i) = lane(moved[node].y, i);
                     lane(y[node].z, i) = lane(moved[node].z, i);
                 }
+                for (int joint = 0; joint < joints; joint++)
+                    lane(turned[joint], i) = lane(turnedSoFar[joint], i);
             }
             any |= failed[i];
         }
@@ -137,12 +179,15 @@ template <int W> __attribute__((noinline)) void gatherStepStart(const Pack& pack
 template <int W> Instability stepPackImplicitly(const Pack& pack, const double* positions, const double* forces,
             const double* box, const StepSettings& settings, double* displacements) {
     typedef typename Lanes<W>::Type Real;
-    static thread_local Scratch vectors, tethers;
+    static thread_local Scratch vectors, tethers, twists;
     const int n = pack.nodes;
     Vector<Real>* f = vectors.reserve<Vector<Real> >(4*n);
     Vector<Real>* y = f+n;
-    const StepStart<W> start = {y+n, y+2*n, tethers.reserve<TetherVector>(pack.tethers.size())};
+    Real* const turned = twists.reserve<Real>(2*numTwists(pack));
+    const StepStart<W> start = {y+n, y+2*n, tethers.reserve<TetherVector>(pack.tethers.size()),
+            turned+numTwists(pack)};
     gatherStepStart<W>(pack, positions, box, settings.flow.present, start);
+    gatherTwists<W>(pack, settings, start.twists);
     gatherForces<W>(pack, forces, f);
     bool failed[W];
     Instability result;
@@ -158,7 +203,7 @@ template <int W> Instability stepPackImplicitly(const Pack& pack, const double* 
         allArePlanned &= planned[i] > 0 || pack.chain[i] < 0;
     }
     if (!allArePlanned)
-        result.iterations = takeStep(pack, settings, start, f, y, failed);
+        result.iterations = takeStep(pack, settings, start, f, y, failed, turned);
     for (int i = 0; i < W; i++) {
         if (allArePlanned)
             failed[i] = pack.chain[i] >= 0;
@@ -168,8 +213,9 @@ template <int W> Instability stepPackImplicitly(const Pack& pack, const double* 
         any |= failed[i];
     }
     if (any && settings.mayDivide)
-        divideStep<W>(takeStep, pack, start, f, settings, y, failed, planned);
+        divideStep<W>(takeStep, pack, start, f, settings, y, failed, turned, planned);
     scatter<W>(pack, y, 1, displacements);
+    scatterTwists<W>(pack, settings, turned, NULL);
     for (int i = 0; i < W; i++)
         if (failed[i] && result.chain < 0)
             result.chain = pack.chain[i];

@@ -14,8 +14,9 @@ public:
     typedef typename Band::Memory Memory;
     typedef typename SegmentEquations<W>::Geometry Geometry;
     typedef typename Coordinates<W>::Factors Factors;
-    ImplicitEquations(const ImplicitState<W>& step, Memory& memory) : step(step), pack(step.pack),
-            n(step.n), segments(step.segments), change(step.change), ofSegments(step), band(pack, memory) {
+    ImplicitEquations(const ImplicitState<W>& step, ImplicitTwist<W, CLOSED>& twist, Memory& memory) : step(step),
+            pack(step.pack), n(step.n), segments(step.segments), change(step.change), twist(twist), ofSegments(step),
+            band(pack, memory) {
     }
     /**
      * Linearise the equations around y, and eliminate the nodes from first to last.
@@ -26,6 +27,10 @@ public:
         ofSegments.begin(iteration);
         if (step.settings.flow.present)
             ofSegments.addDragOfFlow(y);
+        const bool isTwisted = HAS_TWIST && pack.twist.isPresent();
+        if constexpr (HAS_TWIST)
+            if (isTwisted)
+                twist.addForces(y);
         Row rows[3];
         Row *before = rows, *here = rows+1, *after = rows+2;
         // Roots and divisions take long: those of the segment ahead come before the node is eliminated.
@@ -58,6 +63,8 @@ public:
                 ofSegments.addNodeFriction(y, s, *here);
             if (s > 0)
                 Coordinates<W>::template add<OnJoints>(step, s, factors, previous, current, *before, *here, *after);
+            if (isTwisted && s > 0)
+                twist.addStiffness(s, previous, current, *before, *here);
             if (s < n-2) {
                 ofSegments.describeNew(y, s+1, ahead);
                 Coordinates<W>::describeNew(step, s+1, current, ahead, factorsAhead);
@@ -115,7 +122,11 @@ public:
     void addForcesOfOthers() {
         if (forcesOfOthers == NULL)
             return;
-        band.setForcesOnNodes(forcesOfOthers);
+        addForces(forcesOfOthers);
+    }
+    /** Add what forces on nodes do to the changes of y and of the tensions. */
+    void addForces(const Vec* forces) {
+        band.setForcesOnNodes(forces);
         substitute<Goal::Add>();
     }
     /** See TensionBand. */
@@ -135,6 +146,7 @@ private:
     const int n;
     ImplicitSegment<Real>* const segments;
     Vec* const change;
+    ImplicitTwist<W, CLOSED>& twist;
     SegmentEquations<W> ofSegments;
     const CouplingTerm* terms = NULL;
     int numTerms = 0;

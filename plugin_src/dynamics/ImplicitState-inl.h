@@ -32,6 +32,20 @@ template <class Real> struct ImplicitSegment : IteratedSegment<Real> {
     Real randomCoordinate, randomTension, theta, jointTheta;
 };
 
+/** What a step keeps of the twist of a joint, and of the segment behind it: see ImplicitTwist-inl.h. */
+template <class Real> struct TwistedJoint {
+    // The torque is implicit times the change of the twist, and constant; what of that change an end frame makes.
+    Real implicit, constant, turnedByEnd;
+    // Of the segment: its friction over the step, the random torque, and what the elimination leaves.
+    Real friction, random, inversePivot, border;
+    // What this joint has of all torques when each twist changes by as much.
+    Real share;
+    // For some new nodes: the area swept, the torque, how the segment turns, and one over its length.
+    Real swept, torque, turn, perLength;
+    // Half the curvature binormal in the middle of the step.
+    Vector<Real> curvature;
+};
+
 /** The vector from the point of a tether to its node. */
 struct TetherVector {
     double d[3];
@@ -53,6 +67,8 @@ struct ImplicitTether {
 template <int W> struct StepStart {
     Vector<typename Lanes<W>::Type> *nodes, *segments;
     TetherVector* tethers;
+    /** By how much joints are twisted more than at rest, if they can be. */
+    typename Lanes<W>::Type* twists;
 };
 
 /** The stages that steps are made of: the one of scheme "implicit", and the two of second order. */
@@ -70,15 +86,17 @@ template <int W> class ImplicitState {
     typedef Vector<Real> Vec;
 public:
     struct Memory {
-        Scratch segments, vectors, tethers;
+        Scratch segments, vectors, tethers, joints, gradients;
     };
     ImplicitState(const Pack& pack, const StepSettings& settings, const StepStart<W>& start, Memory& memory) :
             pack(pack), settings(settings), start(start), n(pack.nodes), h(settings.stepSize), kT(settings.kT),
             twoStages(settings.scheme == Scheme::ImplicitSecondOrder),
             segments(memory.segments.template reserve<ImplicitSegment<Real> >(n)),
             tethers(memory.tethers.template reserve<ImplicitTether>(pack.tethers.size())),
-            f(memory.vectors.template reserve<Vec>(7*n)), loads(settings.flow.present ? f+3*n : f), change(f+n),
-            rest(f+2*n), external(twoStages ? f+4*n : f), random(twoStages ? f+5*n : f), drift(twoStages ? f+6*n : f) {
+            f(memory.vectors.template reserve<Vec>(7*n)), loads(settings.flow.present || pack.twist.isPresent() ? f+3*n : f), change(f+n),
+            rest(f+2*n), external(twoStages ? f+4*n : f), random(twoStages ? f+5*n : f), drift(twoStages ? f+6*n : f),
+            joints(memory.joints.template reserve<TwistedJoint<Real> >(pack.twist.isPresent() ? n : 0)),
+            gradient(memory.gradients.template reserve<Vec>(pack.twist.isHeld ? 3*n : 0)) {
     }
     const Pack& pack;
     const StepSettings& settings;
@@ -92,6 +110,9 @@ public:
     Vec *const f, *const loads, *const change, *const rest;
     // Forces from outside, of noise and the metric ones; all of them are f if there is one stage alone.
     Vec *const external, *const random, *const drift;
+    // Of twist, if there is any; the second is the gradient of what a chain shares, and memory of its own.
+    TwistedJoint<Real>* const joints;
+    Vec* const gradient;
     Stage stage = Stage::Only;
     /** How much of the forces that last for the whole step a stage has. */
     Scalar shareOfForces() const {

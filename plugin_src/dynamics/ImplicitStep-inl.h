@@ -40,7 +40,7 @@ public:
      */
     ImplicitStep(const Pack& pack, const StepSettings& settings, const StepStart<W>& start, Memory& memory) :
             step(pack, settings, start, memory.state), stages(step), noise(step), positions(step),
-            equations(step, memory.equations), metricForces(step),
+            twist(step), equations(step, twist, memory.equations), metricForces(step),
             tensions(step, equations.getEquationsOfSegments()), convergence(step) {
     }
     /**
@@ -50,9 +50,10 @@ public:
      * @param y       receives how far the nodes move
      * @param failed  receives true for each lane that has not converged or a segment of which changes by more than a
      *                quarter of a turn would do
+     * @param turned  receives by how much twists change, if chains have any
      * @return the number of iterations
      */
-    __attribute__((noinline)) int take(const Vec* forces, Vec* y, bool* failed) {
+    __attribute__((noinline)) int take(const Vec* forces, Vec* y, bool* failed, Real* turned) {
         begin(forces, y);
         for (int i = 0; i < W; i++)
             failed[i] = false;
@@ -62,6 +63,7 @@ public:
             iterations += solve(y, failed);
         }
         convergence.findExcessiveChanges(y, failed);
+        findTwists(y, turned);
         return iterations;
     }
     /** Describe the start of a step, and draw its noise. */
@@ -76,6 +78,15 @@ public:
         stages.describe();
         if (step.settings.kT > 0)
             noise.draw();
+        if constexpr (HAS_TWIST)
+            if (step.pack.twist.isPresent())
+                twist.begin();
+    }
+    /** Find by how much twists have changed when nodes have moved by y. */
+    void findTwists(const Vec* y, Real* turned) {
+        if constexpr (HAS_TWIST)
+            if (step.pack.twist.isPresent())
+                twist.findChanges(y, turned);
     }
     int getNumStages() const {
         return step.twoStages ? 2 : 1;
@@ -91,6 +102,9 @@ public:
     void eliminate(const Vec* y, int iteration) {
         equations.eliminate(y, iteration);
         equations.template substitute<Goal::Find>();
+        if constexpr (HAS_TWIST)
+            if (step.pack.twist.isHeld)
+                twist.shareTorque(equations, iteration);
     }
     /** Ask for the memory that eliminate() begins with. */
     void prefetchStart() const {
@@ -149,6 +163,7 @@ private:
     ImplicitStages<W> stages;
     ImplicitNoise<W> noise;
     ImplicitPositions<W> positions;
+    ImplicitTwist<W, CLOSED> twist;
     ImplicitEquations<W, CLOSED> equations;
     MetricForces<W> metricForces;
     ImplicitTensions<W> tensions;

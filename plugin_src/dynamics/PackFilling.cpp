@@ -58,6 +58,37 @@ void fillLane(ChainPack<double>& pack, PropertyRows<double>& properties, int lan
         properties.setSegment(s, lane, chain.segments[s%chain.segments.size()], chain.planar ? 2 : 3);
 }
 
+void fillTwist(PackTwist<double>& twist, int lanes, int lane, const Chain& chain) {
+    if (!chain.twist.isPresent())
+        return;
+    const ChainTwist& own = chain.twist;
+    const size_t segments = chain.segments.size();
+    if (!twist.isPresent()) {
+        for (auto* values : {&twist.stiffness, &twist.rest, &twist.angularVelocity, &twist.torque})
+            values->assign((segments+1)*lanes, 0.0);
+        twist.friction.assign(segments*lanes, 1.0);
+        twist.directions.assign(6*lanes, 0.0);
+    }
+    for (size_t s = 0; s < segments; s++)
+        twist.friction[s*lanes+lane] = own.friction[s];
+    for (size_t joint = 0; joint < own.stiffness.size(); joint++) {
+        const size_t node = chain.closed && joint == 0 ? segments : chain.closed ? joint : joint+1;
+        twist.stiffness[node*lanes+lane] = own.stiffness[joint];
+        twist.rest[node*lanes+lane] = own.rest[joint];
+    }
+    twist.isHeld |= chain.closed || (own.ends[0].stiffness > 0 && own.ends[1].stiffness > 0);
+    for (int end = 0; end < 2 && !chain.closed; end++) {
+        const EndFrame& frame = own.ends[end];
+        const size_t place = (end == 0 ? 0 : segments)*lanes+lane;
+        const double sign = end == 0 ? -1 : 1;
+        twist.stiffness[place] = frame.stiffness;
+        twist.angularVelocity[place] = sign*frame.angularVelocity;
+        twist.torque[place] = sign*frame.torque;
+        for (int k = 0; k < 3; k++)
+            twist.directions[(3*end+k)*lanes+lane] = frame.direction[k];
+    }
+}
+
 } // namespace
 
 const ChainKernels& cylchain::bestKernels() {
@@ -66,11 +97,12 @@ const ChainKernels& cylchain::bestKernels() {
 }
 
 bool cylchain::mayShareLanes(const Chain& longest, const Chain& chain, double filling) {
-    const size_t least = longest.closed ? longest.segments.size() : ceil((1-filling)*longest.segments.size());
+    const bool haveTwist = longest.twist.isPresent();
+    const size_t least = longest.closed || haveTwist ? longest.segments.size() : ceil((1-filling)*longest.segments.size());
     return hasSegmentFriction(chain) == hasSegmentFriction(longest) &&
             (chain.nodeFriction > 0) == (longest.nodeFriction > 0) && chain.bending == longest.bending &&
             chain.stretching == longest.stretching && chain.closed == longest.closed &&
-            chain.planar == longest.planar && chain.segments.size() >= least;
+            chain.planar == longest.planar && chain.twist.isPresent() == haveTwist && chain.segments.size() >= least;
 }
 
 template <class Scalar> ChainPack<Scalar> cylchain::packWithoutChains(const PackShape& shape, int lanes) {
@@ -99,6 +131,8 @@ ChainPack<double> cylchain::packed(const vector<Chain>& chains, const vector<int
     PropertyRows<double> properties(pack.nodes, lanes);
     for (size_t lane = 0; lane < members.size(); lane++)
         fillLane(pack, properties, lane, chains[members[lane]], members[lane]);
+    for (size_t lane = 0; lane < members.size(); lane++)
+        fillTwist(pack.twist, lanes, lane, chains[members[lane]]);
     properties.giveTo(pack, tables);
     sortTethers(pack);
     return pack;

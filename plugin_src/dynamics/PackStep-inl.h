@@ -16,8 +16,10 @@ public:
         const int n = pack.nodes;
         Vec* f = vectors.reserve<Vec>(4*n);
         y = f+n;
-        start = {y+n, y+2*n, tethers.reserve<TetherVector>(pack.tethers.size())};
+        turned = twists.reserve<Real>(2*numTwists(pack));
+        start = {y+n, y+2*n, tethers.reserve<TetherVector>(pack.tethers.size()), turned+numTwists(pack)};
         gatherStepStart<W>(pack, positions, box, settings.flow.present, start);
+        gatherTwists<W>(pack, settings, start.twists);
         gatherForces<W>(pack, forces, f);
         for (int i = 0; i < W; i++)
             lane(active, i) = taken[i] ? 1 : 0;
@@ -96,12 +98,20 @@ public:
         forOwnNodes([&] (int k, double moved) {
             displacements[k] = moved;
         });
+        if (!pack.twist.isPresent())
+            return;
+        step->findTwists(y, turned);
+        bool taken[W];
+        for (int i = 0; i < W; i++)
+            taken[i] = lane(active, i) != 0;
+        scatterTwists<W>(pack, settings, turned, taken);
     }
 private:
     const Pack& pack;
     StepSettings settings;
-    Scratch vectors, tethers;
+    Scratch vectors, tethers, twists;
     StepStart<W> start;
+    Real* turned;
     /** A vector of a node in a lane, and a fourth number that is not used. */
     typedef FourOf<Scalar> Record;
     Vec *y, *forcesOnNodes, *movesOfNodes;

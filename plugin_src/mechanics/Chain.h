@@ -2,6 +2,7 @@
 #define CYLCHAIN_CHAIN_H_
 
 #include "mechanics/BendingModels.h"
+#include "mechanics/ChainTwist.h"
 #include "mechanics/StretchingModels.h"
 #include <vector>
 
@@ -59,6 +60,10 @@ struct Chain {
     bool planar = false;
     /** The length along the chain at which its first node is: not zero where a chain has grown there. */
     double start = 0;
+    ChainTwist twist;
+    int numTwists() const {
+        return twist.isPresent() ? segments.size()+(closed ? 0 : 1) : 0;
+    }
     int numNodes() const {
         return nodes.size();
     }

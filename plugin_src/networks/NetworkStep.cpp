@@ -382,6 +382,14 @@ bool NetworkStep::divide(const Attempt& whole, int division, double* displacemen
         ofHalf = *recorded;
         half.settings.segmentForces = &ofHalf;
     }
+    // Twists of the halves' starts, their changes in a half and in both.
+    vector<vector<double> > twists, turned, turnedInAll;
+    if (whole.settings.twists != NULL) {
+        twists = *whole.settings.twists;
+        turned = turnedInAll = *whole.settings.twistChanges;
+        half.settings.twists = &twists;
+        half.settings.twistChanges = &turned;
+    }
     const size_t size = moved.size();
     vector<double> start(whole.positions, whole.positions+size), total(size), part(size);
     half.positions = start.data();
@@ -410,6 +418,11 @@ bool NetworkStep::divide(const Attempt& whole, int division, double* displacemen
             total[k] += part[k];
         });
         placeSites(start.data());
+        for (size_t chain = 0; chain < twists.size(); chain++)
+            for (size_t joint = 0; whole.taken[chain] && joint < twists[chain].size(); joint++) {
+                twists[chain][joint] += turned[chain][joint];
+                turnedInAll[chain][joint] = (i == 0 ? 0 : turnedInAll[chain][joint])+turned[chain][joint];
+            }
         for (size_t chain = 0; recorded != NULL && chain < recorded->size(); chain++)
             for (size_t s = 0; whole.taken[chain] && s < ofHalf[chain].size(); s++) {
                 SegmentForces& mean = (*recorded)[chain][s];
@@ -421,6 +434,9 @@ bool NetworkStep::divide(const Attempt& whole, int division, double* displacemen
     forTaken([&] (int k) {
         displacements[k] = total[k];
     });
+    for (size_t chain = 0; chain < turnedInAll.size(); chain++)
+        if (whole.taken[chain])
+            (*whole.settings.twistChanges)[chain] = turnedInAll[chain];
     return true;
 }
 

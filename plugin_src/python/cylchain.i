@@ -213,10 +213,12 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
 %apply std::vector<double>& tensions {std::vector<double>& fractions, std::vector<double>& points,
         std::vector<double>& parameters, std::vector<double>& places, std::vector<double>& gaps,
         std::vector<double>& forces, std::vector<double>& sums, std::vector<double>& loads,
-        std::vector<double>& rotationalFriction};
+        std::vector<double>& rotationalFriction, std::vector<double>& stiffness, std::vector<double>& rest,
+        std::vector<double>& friction, std::vector<double>& twists};
 %apply const std::vector<double>& fractions {const std::vector<double>& points,
         const std::vector<double>& parameters, const std::vector<double>& places, const std::vector<double>& loads,
-        const std::vector<double>& rotationalFriction};
+        const std::vector<double>& rotationalFriction, const std::vector<double>& stiffness,
+        const std::vector<double>& rest, const std::vector<double>& friction, const std::vector<double>& twists};
 
 %typemap(in, numinputs=0) std::vector<Vec3>& vectors (std::vector<OpenMM::Vec3> value) {
     $1 = &value;
@@ -228,8 +230,8 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
     $result = SWIG_Python_AppendOutput($result, tuple, 1);
 }
 %apply std::vector<Vec3>& vectors {std::vector<Vec3>& jointForces, std::vector<Vec3>& directions};
-%apply Vec3& point {Vec3& vector, Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ, Vec3& origin};
-%apply const Vec3& point {const Vec3& vector, const Vec3& velocity, const Vec3& gradientX, const Vec3& gradientY,
+%apply Vec3& point {Vec3& direction, Vec3& vector, Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ, Vec3& origin};
+%apply const Vec3& point {const Vec3& direction, const Vec3& vector, const Vec3& velocity, const Vec3& gradientX, const Vec3& gradientY,
         const Vec3& gradientZ, const Vec3& origin};
 %apply double& OUTPUT {double& restLength, double& stretchingStiffness, double& maximumExtension,
         double& parallelFriction, double& perpendicularFriction, double& rotationalFriction,
@@ -239,7 +241,8 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         double& stallForce, double& volume, double& concentration, double& elementLength, double& stretchingModulus,
         double& bendingRigidity, double& shortening, double& rate, double& angle,
         double& distance, double& beyond, double& range, double& friction, double& diffusion, double& leastCosine,
-        double& largestCosine, double& position, double& captureProbability, double& releaseRate};
+        double& largestCosine, double& position, double& captureProbability, double& releaseRate,
+        double& torque, double& angularVelocity};
 %apply bool& OUTPUT {bool& walksBackward, bool& holdsAtEnds, bool& sameChain, bool& vanishes, bool& isRegular,
         bool& bindsThere, bool& tracks, bool& planar, bool& excluded, bool& transActivated, bool& reversible};
 %apply long long& OUTPUT {long long& bindings, long long& unbindings};

@@ -26,6 +26,20 @@ static void checkFriction(const cylchain::ChainList& chains) {
     }
 }
 
+/** What twist is not for. */
+static void checkTwist(const cylchain::ChainList& chains) {
+    for (size_t index = 0; index < chains.getChains().size(); index++) {
+        const cylchain::Chain& chain = chains.getChains()[index];
+        if (!chain.twist.isPresent())
+            continue;
+        const string name = chains.getName(chains.getNumber(cylchain::ChainKind::StraightSegments, index));
+        if (chain.planar)
+            throw OpenMMException("CylinderChainForce: "+name+" is planar, and cannot have twist");
+        if (chain.nodeFriction > 0 || !cylchain::isAngular(chain.bending))
+            throw OpenMMException("CylinderChainForce: "+name+" is a chain of beads, and cannot have twist");
+    }
+}
+
 /** A control point alone cannot be fixed: a tangent would lead from nowhere. */
 static void checkFixed(const cylchain::ChainList& chains) {
     for (size_t index = 0; index < chains.getBeams().size(); index++) {
@@ -52,7 +66,11 @@ CylinderChainDescription::CylinderChainDescription(const System& system, const C
         if (growth != NULL)
             growth->setMonomers(chains, growing);
     }
+    for (int number : growing)
+        if (chains.getChain(number).twist.isPresent())
+            throw OpenMMException("CylinderChainForce: "+chains.getName(number)+" has twist, and cannot grow");
     checkFriction(chains);
+    checkTwist(chains);
     lookForModes();
 }
 
@@ -75,6 +93,8 @@ vector<bool> findSpareNodes(const System& system) {
 }
 
 static void refuseOtherModels(const cylchain::Chain& present, const cylchain::Chain& old) {
+    if (present.twist.isPresent() != old.twist.isPresent())
+        throw OpenMMException("updateParametersInContext: Whether a chain has twist has changed");
     if (present.bending != old.bending || present.stretching != old.stretching)
         throw OpenMMException("updateParametersInContext: The models of a chain have changed");
 }
@@ -102,6 +122,7 @@ void CylinderChainDescription::update(const CylinderChainForce& force) {
         present.visit(i, [&] (auto& chain) {chain.fixed = fixed;});
     }
     checkFriction(present);
+    checkTwist(present);
     chains = move(present);
     lookForModes();
 }

@@ -286,6 +286,89 @@ void CylinderChainForce::setSegmentPropulsion(int chain, int segment, double pro
     getChain(chain).segments[segment].propulsion = propulsion;
 }
 
+void CylinderChainForce::setChainTwist(int chain, const vector<double>& stiffness, const vector<double>& rest,
+        const vector<double>& friction) {
+    cylchain::Chain& own = getChain(chain);
+    if (friction.empty() && stiffness.empty() && rest.empty()) {
+        own.twist = cylchain::ChainTwist();
+        return;
+    }
+    if (friction.size() != own.segments.size() || stiffness.size() != own.joints.size() ||
+            rest.size() != own.joints.size())
+        throw OpenMMException("CylinderChainForce: Twist needs a stiffness and a rest angle of each joint, and a friction "
+                "of each segment");
+    for (double value : stiffness)
+        if (!(value > 0 && isfinite(value)))
+            throw OpenMMException("CylinderChainForce: The stiffness of a joint against twist must be positive");
+    for (double value : friction)
+        if (!(value > 0 && isfinite(value)))
+            throw OpenMMException("CylinderChainForce: The friction of a segment against turning about itself must be "
+                    "positive");
+    for (double value : rest)
+        if (!isfinite(value))
+            throw OpenMMException("CylinderChainForce: The twist at rest must be finite");
+    own.twist.stiffness = stiffness;
+    own.twist.rest = rest;
+    own.twist.friction = friction;
+}
+
+void CylinderChainForce::getChainTwist(int chain, vector<double>& stiffness, vector<double>& rest,
+        vector<double>& friction) const {
+    const cylchain::ChainTwist& twist = getChain(chain).twist;
+    stiffness = twist.stiffness;
+    rest = twist.rest;
+    friction = twist.friction;
+}
+
+static void checkEnd(const cylchain::Chain& chain, int end) {
+    if (end != 0 && end != 1)
+        throw OpenMMException("CylinderChainForce: The end of a chain must be 0 or 1");
+    if (!chain.twist.isPresent() || chain.closed)
+        throw OpenMMException("CylinderChainForce: Frames are beyond ends of open chains with twist alone");
+}
+
+void CylinderChainForce::setEndFrame(int chain, int end, const Vec3& direction, double stiffness, double torque,
+        double angularVelocity) {
+    cylchain::Chain& own = getChain(chain);
+    checkEnd(own, end);
+    const double length = sqrt(direction.dot(direction));
+    if (!isfinite(length) || !(stiffness >= 0 && isfinite(stiffness)) || !isfinite(torque) ||
+            !isfinite(angularVelocity))
+        throw OpenMMException("CylinderChainForce: The direction, torque and angular velocity of an end frame must be "
+                "finite, and its stiffness not negative");
+    if (length == 0 && (stiffness > 0 || torque != 0))
+        throw OpenMMException("CylinderChainForce: An end frame that is held, or has a torque, needs a direction");
+    if (stiffness > 0 ? torque != 0 : angularVelocity != 0)
+        throw OpenMMException("CylinderChainForce: An end frame has a torque if it turns freely, and an angular velocity "
+                "if it is held");
+    cylchain::EndFrame& frame = own.twist.ends[end];
+    for (int k = 0; k < 3; k++)
+        frame.direction[k] = length > 0 ? direction[k]/length : 0.0;
+    frame.stiffness = stiffness;
+    frame.torque = torque;
+    frame.angularVelocity = angularVelocity;
+}
+
+void CylinderChainForce::getEndFrame(int chain, int end, Vec3& direction, double& stiffness, double& torque,
+        double& angularVelocity) const {
+    checkEnd(getChain(chain), end);
+    const cylchain::EndFrame& frame = getChain(chain).twist.ends[end];
+    direction = Vec3(frame.direction[0], frame.direction[1], frame.direction[2]);
+    stiffness = frame.stiffness;
+    torque = frame.torque;
+    angularVelocity = frame.angularVelocity;
+}
+
+void CylinderChainForce::getTwists(Context& context, int chain, vector<double>& twists) const {
+    getChain(chain);
+    twists = dynamic_cast<CylinderChainForceImpl&>(getImplInContext(context)).getTwists()[chains.getIndex(chain)];
+}
+
+void CylinderChainForce::setTwists(Context& context, int chain, const vector<double>& twists) const {
+    getChain(chain);
+    dynamic_cast<CylinderChainForceImpl&>(getImplInContext(context)).setTwists(chains.getIndex(chain), twists);
+}
+
 void CylinderChainForce::getJointParameters(int chain, int joint, double& stiffness) const {
     checkPart(joint, getNumJoints(chain), "joint", chain);
     stiffness = getChain(chain).joints[joint];

@@ -4,6 +4,8 @@
 #include "openmm/OpenMMException.h"
 #include "openmm/System.h"
 #include "openmm/internal/ContextImpl.h"
+#include <algorithm>
+#include <cmath>
 
 using namespace OpenMM;
 using namespace std;
@@ -29,7 +31,63 @@ void CylinderChainForceImpl::initialize(ContextImpl& context) {
     for (int chain = 0; chain < owner.getNumChains() && planar == -1; chain++)
         if (description->getList().isPlanar(chain))
             planar = chain;
+    const vector<cylchain::Chain>& chains = description->getChains();
+    for (size_t i = 0; i < chains.size() && twisted == -1; i++)
+        if (chains[i].twist.isPresent())
+            twisted = description->getList().getNumber(cylchain::ChainKind::StraightSegments, i);
+    beginState();
     kernel.getAs<CalcCylinderChainForceKernel>().initialize(system, *description);
+}
+
+void CylinderChainForceImpl::setTwists(int index, const vector<double>& values) {
+    if (values.size() != twists[index].size())
+        throw OpenMMException("CylinderChainForce: A chain has "+to_string(twists[index].size())+" twists, but "+
+                to_string(values.size())+" are given");
+    for (double value : values)
+        if (!isfinite(value))
+            throw OpenMMException("CylinderChainForce: Twists must be finite");
+    twists[index] = values;
+}
+
+StateColumns CylinderChainForceImpl::storeState(bool) {
+    vector<int> counts;
+    vector<double> angles;
+    for (const vector<double>& own : twists) {
+        counts.push_back(own.size());
+        angles.insert(angles.end(), own.begin(), own.end());
+    }
+    StateColumns columns;
+    columns.put("counts", counts);
+    columns.put("angles", angles);
+    return columns;
+}
+
+void CylinderChainForceImpl::restoreState(const StateColumns& columns) {
+    const vector<int> counts = columns.get<int>("counts");
+    const vector<double> angles = columns.get<double>("angles");
+    size_t first = 0;
+    bool fits = counts.size() == twists.size();
+    for (size_t i = 0; i < counts.size() && fits; i++) {
+        fits = counts[i] == (int) twists[i].size();
+        first += counts[i];
+    }
+    if (!fits || first != angles.size())
+        throw OpenMMException("CylinderChainForce: The twists of the State or checkpoint are those of other chains");
+    first = 0;
+    for (vector<double>& own : twists) {
+        copy_n(angles.begin()+first, own.size(), own.begin());
+        first += own.size();
+    }
+}
+
+void CylinderChainForceImpl::beginState() {
+    twists.clear();
+    for (const cylchain::Chain& chain : description->getChains()) {
+        vector<double> own(chain.numTwists());
+        if (!own.empty())
+            copy(chain.twist.rest.begin(), chain.twist.rest.end(), own.begin()+(chain.closed ? 0 : 1));
+        twists.push_back(own);
+    }
 }
 
 void CylinderChainForceImpl::updateContextState(ContextImpl& context, bool&) {
@@ -38,6 +96,9 @@ void CylinderChainForceImpl::updateContextState(ContextImpl& context, bool&) {
     if (owner.getNumBodies() > 0)
         throw OpenMMException("CylinderChainForce: There are rigid bodies, which this Integrator would tear apart: "
                 "use a CylinderChainIntegrator");
+    if (hasTwist())
+        throw OpenMMException("CylinderChainForce: "+description->getList().getName(twisted)+" has twist, which this "
+                "Integrator knows nothing of: use a CylinderChainIntegrator");
     if (planar == -1)
         return;
     throw OpenMMException("CylinderChainForce: "+description->getList().getName(planar)+" is planar, but this "

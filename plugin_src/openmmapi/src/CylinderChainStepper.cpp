@@ -57,7 +57,8 @@ static const CylinderChainGrowthForceImpl* findGrowth(ContextImpl& context) {
 }
 
 CylinderChainStepper::CylinderChainStepper(ContextImpl& context, const CylinderChainIntegrator& integrator,
-        CylinderChainForceImpl& force) : context(context), integrator(integrator), chains(force.getDescription()),
+        CylinderChainForceImpl& force) : context(context), integrator(integrator), force(force),
+        chains(force.getDescription()),
         growth(findGrowth(context)), others(context.getSystem(), integrator, chains), couplings(context, others),
         kernel(createKernel(context, force, others)),
         explicitWork(getKernel().getLoop()), periodic(isPeriodic(context.getSystem())), recorded(false) {
@@ -129,6 +130,12 @@ StepSettings CylinderChainStepper::describeStep(uint64_t seed, int level, uint64
     settings.step = step;
     settings.flow = describeFlow();
     settings.precision = static_cast<Precision>(integrator.getPrecision());
+    if (force.hasTwist()) {
+        if (settings.scheme != Scheme::Implicit)
+            throw OpenMMException("CylinderChainIntegrator: Twist is for scheme Implicit alone, with the force group of "
+                    "the CylinderChainForce among the integration force groups");
+        settings.twists = &force.getTwists();
+    }
     return settings;
 }
 
@@ -329,6 +336,8 @@ void CylinderChainStepper::recordForces(StepSettings& settings, bool records) {
     recorded = false;
     if (!records || !isImplicit(settings.scheme))
         return;
+    if (force.hasTwist())
+        throw OpenMMException("CylinderChainIntegrator: Tensions of chains with twist are not recorded");
     segmentForces.resize(chains.getChains().size());
     for (size_t chain = 0; chain < segmentForces.size(); chain++)
         segmentForces[chain].resize(chains.getChains()[chain].segments.size());

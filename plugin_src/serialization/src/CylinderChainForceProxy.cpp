@@ -20,6 +20,41 @@ static vector<int> readParticles(const SerializationNode& chain) {
     return particles;
 }
 
+static void writeTwist(SerializationNode& node, const ChainTwist& twist) {
+    SerializationNode& joints = node.createChildNode("Joints");
+    for (size_t i = 0; i < twist.stiffness.size(); i++)
+        joints.createChildNode("Joint").setDoubleProperty("stiffness", twist.stiffness[i])
+                .setDoubleProperty("rest", twist.rest[i]);
+    SerializationNode& segments = node.createChildNode("Segments");
+    for (double friction : twist.friction)
+        segments.createChildNode("Segment").setDoubleProperty("friction", friction);
+    SerializationNode& ends = node.createChildNode("Ends");
+    for (const EndFrame& frame : twist.ends)
+        ends.createChildNode("End").setDoubleProperty("x", frame.direction[0])
+                .setDoubleProperty("y", frame.direction[1]).setDoubleProperty("z", frame.direction[2])
+                .setDoubleProperty("stiffness", frame.stiffness).setDoubleProperty("torque", frame.torque)
+                .setDoubleProperty("angularVelocity", frame.angularVelocity);
+}
+
+static void readTwist(const SerializationNode& node, CylinderChainForce& force, int chain) {
+    vector<double> stiffness, rest, friction;
+    for (auto& joint : node.getChildNode("Joints").getChildren()) {
+        stiffness.push_back(joint.getDoubleProperty("stiffness"));
+        rest.push_back(joint.getDoubleProperty("rest"));
+    }
+    for (auto& segment : node.getChildNode("Segments").getChildren())
+        friction.push_back(segment.getDoubleProperty("friction"));
+    force.setChainTwist(chain, stiffness, rest, friction);
+    int end = 0;
+    for (auto& frame : node.getChildNode("Ends").getChildren()) {
+        if (!force.isChainClosed(chain))
+            force.setEndFrame(chain, end, Vec3(frame.getDoubleProperty("x"), frame.getDoubleProperty("y"),
+                    frame.getDoubleProperty("z")), frame.getDoubleProperty("stiffness"),
+                    frame.getDoubleProperty("torque"), frame.getDoubleProperty("angularVelocity"));
+        end++;
+    }
+}
+
 static void writeChain(SerializationNode& node, const Chain& own) {
     node.setStringProperty("bendingModel", CylinderChainForce::getBendingModelNames()[(int) own.bending])
             .setStringProperty("stretchingModel", CylinderChainForce::getStretchingModelNames()[(int) own.stretching])
@@ -37,6 +72,8 @@ static void writeChain(SerializationNode& node, const Chain& own) {
     SerializationNode& joints = node.createChildNode("Joints");
     for (double stiffness : own.joints)
         joints.createChildNode("Joint").setDoubleProperty("stiffness", stiffness);
+    if (own.twist.isPresent())
+        writeTwist(node.createChildNode("Twist"), own.twist);
 }
 
 static void writeChain(SerializationNode& node, const BeamChain& own) {
@@ -154,6 +191,9 @@ static int addChain(CylinderChainForce& force, const SerializationNode& node) {
         addSegment(force, chain, j, segments[j]);
     for (size_t j = 0; j < joints.size(); j++)
         force.setJointParameters(chain, j, joints[j].getDoubleProperty("stiffness"));
+    for (auto& child : node.getChildren())
+        if (child.getName() == "Twist")
+            readTwist(child, force, chain);
     return chain;
 }
 
@@ -175,4 +215,4 @@ static unique_ptr<CylinderChainForce> readForce(const SerializationNode& node) {
 }
 
 static const bool isForceRegistered =
-        registerProxy<CylinderChainForce>("CylinderChainForce", 10, write, readForce);
+        registerProxy<CylinderChainForce>("CylinderChainForce", 11, write, readForce);

@@ -245,6 +245,61 @@ public:
      */
     void setJointParameters(int chain, int joint, double stiffness);
     /**
+     * Let the segments of a chain of straight segments have material frames, and its joints an energy of twist,
+     * (stiffness/2) (m-rest)^2: mechanics/ChainTwist.h says what the twist m is.  CylinderChainIntegrator moves such a
+     * chain with the scheme Implicit.  Twists are state of a Context, see getTwists(), and no function of positions:
+     * energies and forces of a Context are without them.  The chain is not planar, and its nodes have no friction.
+     *
+     * @param chain      the index of the chain
+     * @param stiffness  the stiffness of each joint, measured in kJ/mol: the torsional rigidity divided by the rest
+     *                   length
+     * @param rest       the twist of each joint at rest, measured in radians
+     * @param friction   the friction of each segment against turning about itself, measured in kJ ps/mol; none for a
+     *                   chain without twist
+     */
+    void setChainTwist(int chain, const std::vector<double>& stiffness, const std::vector<double>& rest,
+            const std::vector<double>& friction);
+    /**
+     * Get what was set by setChainTwist().
+     */
+    void getChainTwist(int chain, std::vector<double>& stiffness, std::vector<double>& rest,
+            std::vector<double>& friction) const;
+    /**
+     * Set the frame beyond an end of an open chain with twist.  A frame is held if its joint has a stiffness, and turns
+     * freely if it has none.  An end is free unless this is called.
+     *
+     * @param chain            the index of the chain
+     * @param end              0 for that of the first node, and 1 for that of the last
+     * @param direction        where the chain goes on there, from its first to its last node, in any length; zero if
+     *                         the end is free
+     * @param stiffness        the stiffness of the joint to the frame against twist, measured in kJ/mol; zero if the
+     *                         frame turns freely
+     * @param torque           the torque on a frame that turns freely, about the direction, measured in kJ/mol
+     * @param angularVelocity  how fast a frame that is held turns about the direction, measured in radians/ps
+     */
+    void setEndFrame(int chain, int end, const Vec3& direction, double stiffness, double torque,
+            double angularVelocity);
+    /**
+     * Get the frame beyond an end of a chain.  See setEndFrame() for details.
+     */
+    void getEndFrame(int chain, int end, Vec3& direction, double& stiffness, double& torque,
+            double& angularVelocity) const;
+    /**
+     * Get the twists of a chain in a Context: the angle at each of its joints, from the frame before it to the one
+     * behind it.  That of an open chain with N segments has N+1, the first and the last of which are those to the
+     * frames beyond its ends; number j of a closed chain is that at node j.  They begin with those at rest, and stay
+     * what they are when positions are set.
+     *
+     * @param context      a Context of a System that holds this Force
+     * @param chain        the index of the chain
+     * @param[out] twists  the angles, measured in radians; none of a chain without twist
+     */
+    void getTwists(Context& context, int chain, std::vector<double>& twists) const;
+    /**
+     * Set the twists of a chain in a Context.  See getTwists() for details.
+     */
+    void setTwists(Context& context, int chain, const std::vector<double>& twists) const;
+    /**
      * Add a chain of beam elements, which bend inside; mechanics/BeamChain.h says what they are.  Only scheme
      * "implicit" moves them.  Any other Force may act on their particles.
      *
@@ -364,8 +419,8 @@ public:
     void setTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness);
     /**
      * Copy the parameters of segments, joints and tethers to a Context, so that changes made by setSegmentParameters(),
-     * setSegmentPropulsion(), setJointParameters(), setTetherParameters() and setChainPlanar() take effect in it, and
-     * so does what is set of chains of beam elements.
+     * setSegmentPropulsion(), setJointParameters(), setTetherParameters(), setChainPlanar() and setEndFrame() take
+     * effect in it, and so does what is set of chains of beam elements.
      * Models and particles cannot be changed in this way, and neither can chains be added; tethers can.
      */
     void updateParametersInContext(Context& context);

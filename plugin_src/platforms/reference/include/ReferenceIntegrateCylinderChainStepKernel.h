@@ -51,6 +51,7 @@ public:
 private:
     template <class Engine> int advancePack(const Engine& engine, int pack, cylchain::StepSettings settings,
             int count, long long& divided);
+    cylchain::StepSettings withTwists(cylchain::StepSettings settings);
     void displaceBlock(int block, const cylchain::StepSettings& settings, double friction);
     template <class Particles> void findNewPositions(const Particles& own, double stepSize);
     void finishSteps(double stepSize, int steps);
@@ -67,6 +68,9 @@ private:
     int versionOfNetwork, versionOfLengths;
     int mixedChains, unstableParticle = -1;
     std::vector<Vec3> displacements, newPositions;
+    // How much the twists of chains change in the step, and what they are after several of them.
+
+    std::vector<std::vector<double> > twistChanges, newTwists;
 };
 
 } // namespace OpenMM

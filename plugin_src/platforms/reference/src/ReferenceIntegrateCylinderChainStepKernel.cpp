@@ -41,7 +41,16 @@ const vector<Vec3>& ReferenceIntegrateCylinderChainStepKernel::getForces(Context
     return particles->getForces();
 }
 
-Instability ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImpl&, const StepSettings& settings) {
+StepSettings ReferenceIntegrateCylinderChainStepKernel::withTwists(StepSettings settings) {
+    if (settings.twists != NULL) {
+        twistChanges = *settings.twists;
+        settings.twistChanges = &twistChanges;
+    }
+    return settings;
+}
+
+Instability ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImpl&, const StepSettings& given) {
+    const StepSettings settings = withTwists(given);
     const ChainEngine& engine = chainKernel->getEngine();
     const double* positions = &particles->getPositions()[0][0];
     const double* forces = &particles->getForces()[0][0];
@@ -74,6 +83,11 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImp
     return result;
 }
 
+static void addChanges(vector<double>& twists, const vector<double>& changes) {
+    for (size_t joint = 0; joint < twists.size(); joint++)
+        twists[joint] += changes[joint];
+}
+
 template <class Particles> void ReferenceIntegrateCylinderChainStepKernel::findNewPositions(const Particles& own,
         double stepSize) {
     const vector<Vec3>& positions = particles->getPositions();
@@ -85,7 +99,8 @@ template <class Particles> void ReferenceIntegrateCylinderChainStepKernel::findN
 }
 
 Instability ReferenceIntegrateCylinderChainStepKernel::displaceCoupledChains(ContextImpl& context,
-        const StepSettings& settings, const CoupledForces& coupled) {
+        const StepSettings& given, const CoupledForces& coupled) {
+    const StepSettings settings = withTwists(given);
     const ChainEngine& engine = chainKernel->getEngine();
     const BeamEngine& beams = chainKernel->getBeamEngine();
     if (!network || versionOfNetwork != chainKernel->getEngineVersion()) {
@@ -177,6 +192,8 @@ void ReferenceIntegrateCylinderChainStepKernel::move(ContextImpl&, const StepSet
     vector<Vec3>& velocities = particles->getVelocities();
     for (int particle : mobile)
         velocities[particle] = displacements[particle]/settings.stepSize;
+    for (size_t chain = 0; settings.twists != NULL && chain < settings.twists->size(); chain++)
+        addChanges((*settings.twists)[chain], twistChanges[chain]);
     finishSteps(settings.stepSize, 1);
 }
 
@@ -188,9 +205,14 @@ void ReferenceIntegrateCylinderChainStepKernel::finishSteps(double stepSize, int
     particles->move(newPositions, stepSize, steps);
 }
 
-int ReferenceIntegrateCylinderChainStepKernel::advanceChains(ContextImpl&, const StepSettings& settings, int count,
+int ReferenceIntegrateCylinderChainStepKernel::advanceChains(ContextImpl&, const StepSettings& given, int count,
         long long& divided) {
     particles->update();
+    StepSettings settings = withTwists(given);
+    if (settings.twists != NULL) {
+        newTwists = *settings.twists;
+        settings.twists = &newTwists;
+    }
     const ChainEngine& engine = chainKernel->getEngine();
     const BeamEngine& beams = chainKernel->getBeamEngine();
     const vector<int> packs = engine.getPacksOfStep(settings);
@@ -203,6 +225,16 @@ int ReferenceIntegrateCylinderChainStepKernel::advanceChains(ContextImpl&, const
     });
     divided = accumulate(dividedInPack.begin(), dividedInPack.end(), 0LL);
     return *min_element(taken.begin(), taken.end());
+}
+
+static void addTwistChanges(const BeamEngine&, int, const StepSettings&) {
+    // Beams have no twist.
+}
+
+static void addTwistChanges(const ChainEngine& engine, int pack, const StepSettings& settings) {
+    for (int chain : engine.getChainsOfLanes(pack))
+        if (chain >= 0)
+            addChanges((*settings.twists)[chain], (*settings.twistChanges)[chain]);
 }
 
 template <class Engine> int ReferenceIntegrateCylinderChainStepKernel::advancePack(const Engine& engine, int pack,
@@ -228,6 +260,8 @@ template <class Engine> int ReferenceIntegrateCylinderChainStepKernel::advancePa
         divided += instability.divided;
         for (int particle : own)
             newPositions[particle] += displacements[particle];
+        if (settings.twists != NULL)
+            addTwistChanges(engine, pack, settings);
         if (particles->areCopies())
             for (int particle : own)
                 newPositions[particle] = particles->store(particle, newPositions[particle]);
@@ -243,6 +277,8 @@ void ReferenceIntegrateCylinderChainStepKernel::moveAdvanced(ContextImpl&, const
     const vector<Vec3>& positions = particles->getPositions();
     for (int particle : others->getParticles())
         newPositions[particle] = positions[particle];
+    if (settings.twists != NULL)
+        *settings.twists = newTwists;
     finishSteps(settings.stepSize, count);
     const ChainEngine& engine = chainKernel->getEngine();
     if (count > 0)

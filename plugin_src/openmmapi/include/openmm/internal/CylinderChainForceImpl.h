@@ -49,6 +49,28 @@ public:
     }
     void haveGrown(ContextImpl& context, const std::vector<int>& numbers);
     /**
+     * Get whether any chain has twist.
+     */
+    bool hasTwist() const {
+        return twisted != -1;
+    }
+    /**
+     * Get the twists of each chain of straight segments, see CylinderChainForce::getTwists().
+     */
+    std::vector<std::vector<double> >& getTwists() {
+        return twists;
+    }
+    /**
+     * Set the twists of a chain of straight segments, by its number among these.
+     */
+    void setTwists(int index, const std::vector<double>& values);
+    std::string getStateName() const {
+        return hasTwist() ? "twists" : "";
+    }
+    StateColumns storeState(bool inCheckpoint);
+    void restoreState(const StateColumns& columns);
+    void beginState();
+    /**
      * Get the Kernel that computes their forces.
      */
     Kernel& getKernel() {
@@ -61,6 +83,10 @@ private:
     // The first chain that is planar, or -1.
 
     int planar = -1;
+    // The first chain that has twist, or -1; and the twists of each chain of straight segments.
+
+    int twisted = -1;
+    std::vector<std::vector<double> > twists;
 };
 
 } // namespace OpenMM

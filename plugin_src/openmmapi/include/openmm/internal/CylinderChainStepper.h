@@ -103,6 +103,7 @@ private:
     void getBox(double* box) const;
     ContextImpl& context;
     const CylinderChainIntegrator& integrator;
+    CylinderChainForceImpl& force;
     const CylinderChainDescription& chains;
     // NULL if no chains grow.
 

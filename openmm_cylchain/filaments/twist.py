@@ -1,0 +1,76 @@
+"""Frames beyond the ends of filaments with twist, and what filaments with twist cannot have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..units.quantities import DIMENSIONLESS, ENERGY, RATE, finite_number, one_of, vector, whole_number
+
+FILAMENT_ENDS = ("minus", "plus")
+"""Of the first and of the last node, as numbers 0 and 1."""
+
+
+@dataclass(frozen=True)
+class EndFrame:
+    """A frame beyond an end of a filament, which the material of the filament there is bound to.
+
+    Attributes
+    ----------
+    filament : int
+    end : {"minus", "plus"}
+        That of the first node, or that of the last.
+    direction : tuple of three floats
+        Where the filament would go on, or has come from: a unit vector from minus to plus.
+    torque : float or None
+        On a frame that turns freely about the direction, in kJ/mol; None if the frame is held.
+    angular_velocity : float
+        Of a frame that is held, about the direction, in radians/ps.
+    """
+
+    filament: int
+    end: str
+    direction: tuple[float, float, float]
+    torque: float | None = None
+    angular_velocity: float = 0.0
+
+    def __post_init__(self) -> None:
+        label = "End frame"
+        object.__setattr__(self, "filament", whole_number(self.filament, 0, f"{label}: filament"))
+        one_of(self.end, FILAMENT_ENDS, f"{label}: end")
+        direction = vector(self.direction, DIMENSIONLESS, f"{label}: direction")
+        length = float(np.linalg.norm(direction))
+        if length == 0.0:
+            raise InputError(f"{label}: direction must not be the zero vector.")
+        object.__setattr__(self, "direction", tuple((direction / length).tolist()))
+        if self.torque is not None:
+            object.__setattr__(self, "torque", finite_number(self.torque, ENERGY, f"{label}: torque"))
+        velocity = finite_number(self.angular_velocity, RATE, f"{label}: angular_velocity")
+        object.__setattr__(self, "angular_velocity", velocity)
+        if self.torque is not None and velocity != 0.0:
+            raise InputError(f"{label}: give a torque to a frame that turns freely, or an angular velocity, not both.")
+
+
+def end_number(end: str, label: str) -> int:
+    """0 for "minus" and 1 for "plus"; InputError for anything else."""
+    one_of(end, FILAMENT_ENDS, label)
+    return FILAMENT_ENDS.index(end)
+
+
+def has_twist(filament_type: Any) -> bool:
+    """Whether filaments of a type resist twist."""
+    return getattr(filament_type, "torsional_rigidity", None) is not None
+
+
+def refuse_twist(filaments: Iterable[Any], what: str) -> None:
+    """Raise InputError, naming the first filament with twist, for something that knows none."""
+    for number, filament in enumerate(filaments):
+        if has_twist(filament.type):
+            raise InputError(
+                f"Filament {number} ({filament.type.name}) has twist, which {what} cannot have as yet: leave out "
+                "torsional_rigidity and twist_persistence_length of its type."
+            )

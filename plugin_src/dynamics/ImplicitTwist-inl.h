@@ -1,0 +1,297 @@
+// Included into the namespace of an instruction set. It does not compile alone.
+
+/**
+ * Twist in an implicit step: see docs/design/twist.md.
+ *
+ * The angles by which segments turn about themselves are unknowns beside the nodes. Given the nodes, they solve
+ *
+ *     Z_s turn_s/h = T_(s+1) - T_s + random_s,      T_s = k (q_s + theta c_s - (2 theta-1)^(1/2) q_random),
+ *     c_s = turn_s - turn_(s-1) + swept_s,
+ *
+ * with the twist q_s of a joint at the start, and the area swept_s that the great circle between its tangents sweeps on
+ * the unit sphere, by which the angle between frames that are carried along changes. That is done in each iteration, and the
+ * torques T_s that come out are forces -T_s J_s(m) on nodes. What a change of the nodes does to T is in the equations as
+ * far as all torques of a chain change together.
+ */
+
+/** Whether there are packs with twist: in double precision alone. */
+constexpr bool HAS_TWIST = sizeof(Scalar) == sizeof(double);
+
+/** By this much, nodes may give way to the torque that all of a chain shares without its being in their equations. */
+const Scalar NEARLY_RIGID = 0.1;
+
+/** The angle of a complex number x+iy, in (-pi, pi). */
+template <class Real> CYLCHAIN_INLINE Real argument(Real x, Real y) {
+    const Real tangent = y/x, square = tangent*tangent;
+    bool isSmall = true;
+    for (int i = 0; i < LANE_COUNT<Real>; i++) {
+        Real s = square, a = x;
+        isSmall &= lane(a, i) > 0 && lane(s, i) < 0.03;
+    }
+    Real result;
+    if (isSmall) {
+        // Its series, to 10^-17 at the limit.
+        result = splat<Real>(1.0/21);
+        for (int k = 19; k > 0; k -= 2)
+            result = splat<Real>(1.0/k)-square*result;
+        return result*tangent;
+    }
+    for (int i = 0; i < LANE_COUNT<Real>; i++) {
+        Real a = x, b = y;
+        lane(result, i) = std::atan2(lane(b, i), lane(a, i));
+    }
+    return result;
+}
+
+/**
+ * The area on the unit sphere that the great circle from a to b sweeps as it moves to that from newA to newB: positive if
+ * a, b, newB, newA go around it counterclockwise, as seen from outside.
+ */
+template <class Real> CYLCHAIN_INLINE Real sweptArea(const Vector<Real>& a, const Vector<Real>& b,
+        const Vector<Real>& newA, const Vector<Real>& newB) {
+    // The sum of two triangles.
+    const Real across = 1+a.dot(newB);
+    const Real x1 = across+a.dot(b)+b.dot(newB), y1 = a.dot(crossProduct(b, newB));
+    const Real x2 = across+newA.dot(newB)+a.dot(newA), y2 = a.dot(crossProduct(newB, newA));
+    return 2*argument<Real>(x1*x2-y1*y2, x1*y2+x2*y1);
+}
+
+template <int W, bool CLOSED> class ImplicitTwist {
+    typedef typename Lanes<W>::Type Real;
+    typedef Vector<Real> Vec;
+public:
+    explicit ImplicitTwist(ImplicitState<W>& step) : step(step), pack(step.pack), twist(pack.twist),
+            segments(pack.segments), first(CLOSED ? 1 : 0), joints(step.joints) {
+        for (int end = 0; end < 2 && !CLOSED && twist.isPresent(); end++)
+            directions[end] = {loaded<Real>(twist.directions, 3*end), loaded<Real>(twist.directions, 3*end+1),
+                    loaded<Real>(twist.directions, 3*end+2)};
+    }
+    /** Describe the start of a step, draw the noise, and eliminate the turns of segments. */
+    __attribute__((noinline)) void begin() {
+        for (int s = 0; s <= segments; s++) {
+            TwistedJoint<Real>& joint = joints[s];
+            const Real stiffness = loaded<Real>(twist.stiffness, s);
+            Real friction = loaded<Real>(twist.friction, std::min(s, segments-1));
+            joint.friction = friction*(1/step.h);
+            friction = lesser<Real>(friction, loaded<Real>(twist.friction, before(s)));
+            const Real theta = larger<Real>(splat<Real>(0.5), 1-friction/(4*step.h*stiffness+TINY));
+            joint.implicit = stiffness*theta;
+            joint.constant = stiffness*step.start.twists[s]+loaded<Real>(twist.torque, s);
+            joint.turnedByEnd = loaded<Real>(twist.angularVelocity, s)*step.h;
+            joint.random = Real{};
+            // The noise of equilibrium, for now.
+            joint.torque = root(stiffness*(2*theta-1)*step.kT);
+        }
+        if (step.settings.kT > 0)
+            draw();
+        factorise();
+    }
+    /** Set the forces of twist, for new nodes, and add them to the loads of these. */
+    __attribute__((noinline)) void addForces(const Vec* y) {
+        solve(y);
+        Vec* const loads = step.loads;
+        if (!step.settings.flow.present)
+            for (int node = 0; node < step.n; node++)
+                loads[node] = step.f[node];
+        for (int node = 0; node < step.n && twist.isHeld; node++)
+            step.gradient[node] = Vec {};
+        for (int s = first; s <= segments; s++) {
+            const TwistedJoint<Real>& joint = joints[s];
+            if (s > 0)
+                addGradient(joint, s-1, joint.curvature*joints[s-1].perLength);
+            if (s < segments || CLOSED)
+                addGradient(joint, s, joint.curvature*joint.perLength);
+        }
+    }
+    /**
+     * Let all torques of chains that are held change with the nodes: what the equations without that have found for the
+     * changes of nodes becomes what those with it do.
+     *
+     * @param iteration  how many there were before; the first one finds how far nodes give way, for all
+     */
+    template <class Equations> void shareTorque(Equations& equations, int iteration) {
+        Vec* const response = step.gradient+step.n;
+        Vec* const forces = response+step.n;
+        if (iteration == 0)
+            equations.respond(step.gradient, response);
+        else if (!givesWay)
+            return;
+        Real found = Real{}, own = Real{};
+        for (int node = 0; node < step.n; node++) {
+            found = found+step.gradient[node].dot(step.change[node]);
+            own = own+step.gradient[node].dot(response[node]);
+        }
+        own = shared*own;
+        givesWay = false;
+        for (int i = 0; i < W; i++)
+            givesWay |= lane(own, i) > NEARLY_RIGID;
+        if (!givesWay)
+            return;
+        const Real share = -shared*found/(1+own);
+        for (int node = 0; node < step.n; node++)
+            forces[node] = step.gradient[node]*share;
+        equations.addForces(forces);
+    }
+    /** Add how the torque of a joint changes with the directions of its segments, to the equations of its nodes. */
+    template <class Row> CYLCHAIN_INLINE void addStiffness(int s, const NewSegmentGeometry<Real>& geometry1,
+            const NewSegmentGeometry<Real>& geometry2, Row& before, Row& here) const {
+        const Vec t1 = geometry1.middleTangent, t2 = geometry2.middleTangent;
+        // The gradient is that of the middle, which moves half as far.
+        const Vec axis = (t1+t2)*(joints[s].torque*geometry1.middleInverse*geometry2.middleInverse*
+                (0.25/(1+t1.dot(t2)+TINY)));
+        const Matrix<Real> mixed = {{Real{}, -axis.z, axis.y}, {axis.z, Real{}, -axis.x}, {-axis.y, axis.x, Real{}}};
+        before.second = before.second-mixed;
+        before.upper = before.upper+mixed;
+        here.upper = here.upper+mixed;
+    }
+    /** Find how the twists have changed when the nodes have moved by y. */
+    __attribute__((noinline)) void findChanges(const Vec* y, Real* changes) {
+        solve(y);
+        for (int s = 0; s <= segments; s++) {
+            const TwistedJoint<Real>& joint = joints[s];
+            changes[s] = joint.swept+joint.turnedByEnd;
+            if (s < segments || CLOSED)
+                changes[s] = changes[s]+joints[s < segments ? s : 0].turn;
+            if (s > 0)
+                changes[s] = changes[s]-joints[s-1].turn;
+        }
+    }
+private:
+    ImplicitState<W>& step;
+    const Pack& pack;
+    const PackTwist<Scalar>& twist;
+    const int segments, first;
+    TwistedJoint<Real>* const joints;
+    Vec directions[2];
+    /** The sum of torques when each twist changes by one; and in rings, what the elimination needs. */
+    Real shared, corner, perCorner;
+    /** Whether the nodes of any chain give way to its torque by so much that their equations need it. */
+    bool givesWay = true;
+
+    /** The segment before a joint, or at the first end of an open chain, the one behind it. */
+    int before(int s) const {
+        return s > 0 ? s-1 : CLOSED ? segments-1 : 0;
+    }
+    /** The joint before a segment. */
+    int jointBefore(int s) const {
+        return s == 0 && CLOSED ? segments : s;
+    }
+    void draw() {
+        const NoiseKey key = noiseKey(step.settings);
+        NoisePlaces<W> places = noisePlaces<W>(pack);
+        // Chains with twist have no friction of nodes, whose numbers these would be.
+        Real normals[4];
+        for (int s = 0; s <= segments; s++, places.part += 1) {
+            drawNormals<W, 2>(key, NoiseKind::Node, places, normals);
+            TwistedJoint<Real>& joint = joints[s];
+            joint.constant = joint.constant-normals[0]*joint.torque;
+            joint.random = normals[1]*root(2*step.kT*joint.friction);
+        }
+    }
+    /** Eliminate the turns of segments, and find how torques respond to a change of all twists. */
+    void factorise() {
+        for (int s = 0; s < segments; s++) {
+            Real pivot = joints[s].friction+joints[jointBefore(s)].implicit+joints[s+1].implicit;
+            if (CLOSED && s == 0)
+                pivot = pivot+pivot;
+            if (CLOSED && s == segments-1) {
+                const Real last = joints[segments].implicit;
+                pivot = pivot+last*last*(2*joints[0].inversePivot);
+            }
+            if (s > 0)
+                pivot = pivot-joints[s].implicit*joints[s].implicit*joints[s-1].inversePivot;
+            joints[s].inversePivot = 1/pivot;
+        }
+        if (CLOSED) {
+            // By Sherman and Morrison, for the coupling of the last segment and the first.
+            const Real last = joints[segments].implicit, diagonal = 0.5/joints[0].inversePivot;
+            corner = last/diagonal;
+            for (int s = 0; s < segments; s++)
+                joints[s].turn = s == 0 ? -diagonal : Real{};
+            joints[segments-1].turn = joints[segments-1].turn-last;
+            substitute();
+            for (int s = 0; s < segments; s++)
+                joints[s].border = joints[s].turn;
+            perCorner = 1/(1+joints[0].border+corner*joints[segments-1].border);
+        }
+        for (int s = 0; s < segments; s++)
+            joints[s].turn = joints[s+1].implicit-joints[jointBefore(s)].implicit;
+        substitute();
+        if (CLOSED)
+            closeRing();
+        shared = Real{};
+        for (int s = first; s <= segments; s++) {
+            joints[s].share = joints[s].implicit*(1+twistOfTurns(s));
+            shared = shared+joints[s].share;
+        }
+        for (int s = first; s <= segments; s++)
+            joints[s].share = joints[s].share*(1/(shared+TINY));
+    }
+    /** How the turns of segments change the twist of a joint. */
+    CYLCHAIN_INLINE Real twistOfTurns(int s) const {
+        Real result = Real{};
+        if (s < segments || CLOSED)
+            result = joints[s < segments ? s : 0].turn;
+        if (s > 0)
+            result = result-joints[s-1].turn;
+        return result;
+    }
+    /** Solve the equations of open chains for turns, in which the right sides are. */
+    void substitute() {
+        for (int s = 1; s < segments; s++)
+            joints[s].turn = joints[s].turn+joints[s].implicit*joints[s-1].inversePivot*joints[s-1].turn;
+        for (int s = segments-1; s >= 0; s--) {
+            Real right = joints[s].turn;
+            if (s < segments-1)
+                right = right+joints[s+1].implicit*joints[s+1].turn;
+            joints[s].turn = right*joints[s].inversePivot;
+        }
+    }
+    void closeRing() {
+        const Real part = (joints[0].turn+corner*joints[segments-1].turn)*perCorner;
+        for (int s = 0; s < segments; s++)
+            joints[s].turn = joints[s].turn-joints[s].border*part;
+    }
+    /** Find the turns and torques for new nodes. */
+    void solve(const Vec* y) {
+        Vec tangent = directions[0], newTangent = directions[0], middle = directions[0];
+        for (int s = 0; s <= segments; s++) {
+            TwistedJoint<Real>& joint = joints[s];
+            const Vec before = tangent, newBefore = newTangent, middleBefore = middle;
+            if (s < segments || CLOSED) {
+                const Vec difference = step.segments[s].difference, newDifference = difference+(y[s+1]-y[s]);
+                const Vec both = difference+newDifference;
+                const Real newLength = root(newDifference.dot(newDifference)), length = root(both.dot(both));
+                const Real perLengths = 1/(newLength*length);
+                tangent = step.segments[s].tangent;
+                newTangent = newDifference*(perLengths*length);
+                middle = both*(perLengths*newLength);
+                joint.perLength = 2*perLengths*newLength;
+            }
+            else
+                tangent = newTangent = middle = directions[1];
+            if (s < first)
+                continue;
+            joint.swept = sweptArea<Real>(before, tangent, newBefore, newTangent);
+            joint.curvature = crossProduct(middleBefore, middle)*(1/(1+middleBefore.dot(middle)+TINY));
+            joint.torque = joint.implicit*(joint.swept+joint.turnedByEnd)+joint.constant;
+        }
+        for (int s = 0; s < segments; s++)
+            joints[s].turn = joints[s].random+joints[s+1].torque-joints[jointBefore(s)].torque;
+        substitute();
+        if (CLOSED)
+            closeRing();
+        for (int s = first; s <= segments; s++)
+            joints[s].torque = joints[s].torque+joints[s].implicit*twistOfTurns(s);
+    }
+    CYLCHAIN_INLINE void addGradient(const TwistedJoint<Real>& joint, int s, const Vec& gradient) const {
+        const Vec force = gradient*joint.torque;
+        step.loads[s] = step.loads[s]+force;
+        step.loads[s+1] = step.loads[s+1]-force;
+        if (!twist.isHeld)
+            return;
+        const Vec share = gradient*joint.share;
+        step.gradient[s] = step.gradient[s]-share;
+        step.gradient[s+1] = step.gradient[s+1]+share;
+    }
+};

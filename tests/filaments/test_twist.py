@@ -1,0 +1,502 @@
+"""Filaments with twist: what they are given, their equilibrium at any step, linking numbers, and what is refused."""
+
+import numpy as np
+import openmm
+import pytest
+from openmm import unit
+
+from openmm_cylchain import F_ACTIN, Filaments, FilamentType, InputError, analysis, capsule_contact_force, theory
+from openmm_cylchain.engines.compiled import CylinderChainForce
+from openmm_cylchain.units.quantities import BOLTZMANN
+from support.contexts import new_context, positions_of
+from support.solvent import KT, TEMPERATURE, VISCOSITY
+
+SIGMAS = 4.0
+LENGTH = 5.0
+CHAIN = {
+    "name": "DNA",
+    "diameter": 2.0,
+    "segment_length": LENGTH,
+    "bending_rigidity": 50.0 * KT,
+    "stretching_modulus": 4000.0 * KT,
+    "bending_model": "kratky-porod",
+}
+DNA = FilamentType(torsional_rigidity=100.0 * KT, **CHAIN)
+UNTWISTED = FilamentType(**CHAIN)
+END = 4.0 * KT
+NANOSECOND = 1e3
+
+
+def in_context(filaments, step, pull=None, seed=1, platform="CPU", contacts=False):
+    """A Context of filaments, which constant forces pull along z, and a FilamentsInContext.
+
+    Stronger ones hold the last segment along z, where a frame may be.
+    """
+    _, system, positions = filaments.build()
+    if pull is not None:
+        force = openmm.CustomExternalForce("-pull*z")
+        force.addPerParticleParameter("pull")
+        for nodes in filaments.node_indices:
+            force.addParticle(int(nodes[-1]), [max(pull, END)])
+            force.addParticle(int(nodes[-2]), [pull - max(pull, END)])
+        system.addForce(force)
+    if contacts:
+        system.addForce(capsule_contact_force(filaments, system, 2.0))
+    integrator = filaments.create_integrator(system, step, random_seed=seed, checks=False)
+    context = new_context(system, positions, integrator, platform)
+    return context, filaments.in_context(context)
+
+
+def held_chains(chains, segments, torque=None, kind=DNA):
+    """Filaments along z, clamped at their minus ends, whose plus ends are held or have a torque."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    for number in range(chains):
+        filaments.add_straight(kind, segments, [100.0 * number, 0, 0], [0, 0, 1], clamped=[0, 1])
+        if kind is DNA:
+            filaments.add_end_frame(number, "minus", [0, 0, 2.0])
+            filaments.add_end_frame(number, "plus", [0, 0, 1.0], torque=torque)
+    return filaments
+
+
+def mean_and_error(samples):
+    """Of samples (times, filaments), which are independent from filament to filament."""
+    of_filaments = np.mean(samples, axis=0)
+    return of_filaments.mean(), of_filaments.std(ddof=1) / np.sqrt(len(of_filaments))
+
+
+def assert_near(samples, exact, error=0.05):
+    mean, deviation = mean_and_error(np.array(samples))
+    assert SIGMAS * deviation < 5 * error * abs(exact), "too few samples to tell"
+    assert mean == pytest.approx(exact, abs=SIGMAS * deviation)
+
+
+# What is given
+
+
+def test_rigidity_is_given_with_units_or_as_a_length():
+    one = FilamentType(torsional_rigidity=250.0, **CHAIN)
+    assert FilamentType(torsional_rigidity=250.0 * unit.kilojoule_per_mole * unit.nanometer, **CHAIN) == one
+    of_length = FilamentType(twist_persistence_length=10 * unit.angstrom, temperature=TEMPERATURE, **CHAIN)
+    assert of_length.torsional_rigidity == pytest.approx(KT) and of_length.twist_persistence_length is None
+    assert one.twist_stiffness == 50.0
+    assert one.with_segment_length(10.0).twist_stiffness == 25.0
+    viscosity = 602.214
+    assert one.axial_friction(viscosity) == pytest.approx(4 * np.pi * viscosity * 1.0**2 * LENGTH)
+    assert one.axial_friction(1e-3 * unit.pascal * unit.second) == pytest.approx(one.axial_friction(viscosity))
+
+
+@pytest.mark.parametrize(
+    ("own", "message"),
+    [
+        ({"torsional_rigidity": 0.0}, "torsional_rigidity"),
+        ({"torsional_rigidity": -1.0}, "torsional_rigidity"),
+        ({"torsional_rigidity": np.nan}, "torsional_rigidity"),
+        ({"torsional_rigidity": 1.0 * unit.nanometer}, "torsional_rigidity"),
+        ({"twist_persistence_length": 50.0}, "temperature"),
+        ({"twist_persistence_length": -1.0, "temperature": 300.0}, "twist_persistence_length"),
+        ({"twist_persistence_length": 50.0, "torsional_rigidity": 1.0, "temperature": 300.0}, "either"),
+    ],
+)
+def test_bad_rigidities_are_refused(own, message):
+    with pytest.raises(InputError, match=message):
+        FilamentType(**CHAIN, **own)
+
+
+def test_what_has_no_twist_is_refused():
+    with pytest.raises(InputError, match="no twist"):
+        _ = UNTWISTED.twist_stiffness
+    with pytest.raises(InputError, match="straight segments"):
+        FilamentType(torsional_rigidity=1.0, element="beam", **{**CHAIN, "bending_model": "inscribed-circle"})
+    with pytest.raises(InputError, match="portable engine has no twist"):
+        Filaments(VISCOSITY, TEMPERATURE, engine="portable").add_straight(DNA, 4, [0, 0, 0], [0, 0, 1])
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    with pytest.raises(InputError, match="planar, and cannot have twist"):
+        filaments.add_straight(DNA, 4, [0, 0, 0], [1, 0, 0], planar=True)
+    filaments.add_straight(UNTWISTED, 4, [0, 0, 0], [0, 0, 1])
+    with pytest.raises(InputError, match="has no twist"):
+        filaments.add_end_frame(0, "minus", [0, 0, 1])
+
+
+def test_bad_frames_are_refused():
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    filaments.add_straight(DNA, 4, [0, 0, 0], [0, 0, 1])
+    filaments.add_ring(DNA, 12, [50, 0, 0])
+    for arguments, message in (
+        ((1, "minus", [0, 0, 1]), "ring"),
+        ((2, "minus", [0, 0, 1]), "2"),
+        ((0, "left", [0, 0, 1]), "end"),
+        ((0, "minus", [0, 0, 0]), "zero vector"),
+        ((0, "minus", [0, 0, np.nan]), "direction"),
+    ):
+        with pytest.raises(InputError, match=message):
+            filaments.add_end_frame(*arguments)
+    for options, message in (
+        ({"torque": np.nan}, "torque"),
+        ({"torque": 1.0 * unit.nanometer}, "torque"),
+        ({"angular_velocity": np.inf}, "angular_velocity"),
+        ({"torque": 1.0, "angular_velocity": 1.0}, "not both"),
+    ):
+        with pytest.raises(InputError, match=message):
+            filaments.add_end_frame(0, "plus", [0, 0, 1], **options)
+    filaments.add_end_frame(0, "plus", [0, 0, 1], torque=8 * unit.piconewton * unit.nanometer)
+    assert filaments.end_frames[0].torque == pytest.approx(8 * 0.602214076)
+    with pytest.raises(InputError, match="already"):
+        filaments.add_end_frame(0, "plus", [0, 0, 1])
+
+
+def test_other_schemes_and_integrators_are_refused():
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    filaments.add_straight(DNA, 4, [0, 0, 0], [0, 0, 1])
+    _, system, positions = filaments.build()
+    for scheme in ("implicit-second-order", "midpoint", "euler"):
+        with pytest.raises(InputError, match="twist"):
+            filaments.create_integrator(system, 1.0, scheme=scheme)
+    context = new_context(system, positions, openmm.LangevinMiddleIntegrator(300.0, 1.0, 1e-6))
+    with pytest.raises(openmm.OpenMMException, match="twist"):
+        context.getIntegrator().step(1)
+
+
+def test_twists_are_asked_for_and_set():
+    filaments = held_chains(1, 4)
+    filaments.add_straight(UNTWISTED, 4, [50, 0, 0], [0, 0, 1])
+    filaments.add_ring(DNA, 12, [150, 0, 0])
+    _, own = in_context(filaments, NANOSECOND)
+    assert own.twists(0).unit == unit.radian and own.twists(0)._value.tolist() == [0.0] * 5
+    assert own.twists(2)._value.shape == (12,)
+    own.set_twists(2, np.full(12, 30.0) * unit.degree)
+    assert own.twists(2)._value == pytest.approx(np.full(12, np.pi / 6))
+    own.turn_end(0, "plus", 90 * unit.degree)
+    own.turn_end(0, "minus", -0.25)
+    assert own.twists(0)._value == pytest.approx([0.25, 0, 0, 0, np.pi / 2])
+    for function, arguments in (
+        (own.twists, (1,)),
+        (own.twists, (3,)),
+        (own.set_twists, (2, [1.0])),
+        (own.set_twists, (2, [np.nan] * 12)),
+        (own.turn_end, (2, "plus", 1.0)),
+        (own.turn_end, (0, "plus", np.nan)),
+        (own.turn_end, (0, "left", 1.0)),
+        (own.record_tensions, ()),
+        (own.joint_tensions, ()),
+    ):
+        with pytest.raises(InputError):
+            function(*arguments)
+
+
+def test_force_survives_xml():
+    filaments = held_chains(2, 4, torque=1.5)
+    _, system, _ = filaments.build()
+    copy = openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(system))
+    force, original = (
+        next(CylinderChainForce.cast(own) for own in one.getForces() if CylinderChainForce.isinstance(own))
+        for one in (copy, system)
+    )
+    assert force.getChainTwist(1) == original.getChainTwist(1)
+    for end in (0, 1):
+        assert str(force.getEndFrame(1, end)) == str(original.getEndFrame(1, end))
+
+
+@pytest.mark.parametrize("platform", ["Reference", "CPU"])
+def test_checkpoint_goes_on_to_the_bit(platform):
+    """And so do a State with integratorParameters, and a Context of another System."""
+
+    def chains_and_a_ring():
+        filaments = held_chains(3, 12)
+        filaments.add_ring(DNA, 12, [500, 0, 0])
+        return in_context(filaments, 100 * NANOSECOND, pull=KT, platform=platform)
+
+    (context, own), *others = [chains_and_a_ring() for _ in range(4)]
+    context.getIntegrator().step(37)
+    others[0][0].loadCheckpoint(context.createCheckpoint())
+    others[1][0].setState(context.getState(positions=True, integratorParameters=True))
+    others[2][1].go_on_from(context)
+    context.getIntegrator().step(21)
+    for other, of_other in others:
+        assert of_other.twists(3)._value.any()
+        other.getIntegrator().step(21)
+        assert np.array_equal(positions_of(context), positions_of(other))
+        for number in range(4):
+            assert np.array_equal(own.twists(number)._value, of_other.twists(number)._value)
+
+
+def test_steps_taken_alone_are_those_taken_together():
+    """One call of ``step`` for each, and one for all of them."""
+    ends = []
+    for calls in (1, 40):
+        filaments = Filaments(VISCOSITY, TEMPERATURE)
+        filaments.add_straight(DNA, 12, [0, 0, 0], [0, 0, 1])
+        context, own = in_context(filaments, 10 * NANOSECOND)
+        for _ in range(calls):
+            context.getIntegrator().step(40 // calls)
+        ends.append((positions_of(context), own.twists(0)._value))
+    assert np.array_equal(ends[0][0], ends[1][0]) and np.array_equal(ends[0][1], ends[1][1])
+
+
+# Linking numbers
+
+
+@pytest.mark.parametrize("contacts", [False, True])
+def test_linking_number_of_rings_is_followed(contacts):
+    """The sum of twist and writhe stays what it was, in networks as well."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    for number in range(3):
+        filaments.add_ring(DNA, 24, [120.0 * number, 0, 0])
+    context, own = in_context(filaments, 20 * NANOSECOND, contacts=contacts)
+    for number in range(3):
+        own.set_twists(number, np.full(24, np.pi * number / 24))
+    for _ in range(60):
+        context.getIntegrator().step(3)
+        positions = positions_of(context)
+        for number, nodes in enumerate(filaments.node_indices):
+            turns = own.twists(number)._value.sum() / (2 * np.pi) + analysis.writhe(positions[nodes])
+            assert turns == pytest.approx(0.5 * number, abs=1e-10)
+
+
+def test_linking_number_of_a_held_chain_is_followed():
+    """With its ends joined far away, by a polygon in a plane beside them."""
+    filaments = held_chains(1, 16)
+    context, own = in_context(filaments, 100 * NANOSECOND, pull=2 * KT)
+    own.turn_end(0, "plus", 2 * np.pi)
+    turns = []
+    for _ in range(40):
+        context.getIntegrator().step(3)
+        nodes = positions_of(context)
+        first, last = nodes[0], nodes[-1]
+        far = 1e6
+        around = [last + [0, 0, far], [far, 0, far], [far, 0, -far], first - [0, 0, far]]
+        turns.append(own.twists(0)._value.sum() / (2 * np.pi) + analysis.writhe(np.concatenate([nodes, around])))
+    assert turns == pytest.approx([1.0] * 40, abs=1e-4)
+
+
+def test_frames_turn():
+    """At a given speed: that of the straight chain, all of whose joints share the turns."""
+    filaments = Filaments(VISCOSITY, 0.0)
+    filaments.add_straight(DNA, 8, [0, 0, 0], [0, 0, 1], clamped=[0, 1])
+    filaments.add_end_frame(0, "minus", [0, 0, 1])
+    filaments.add_end_frame(0, "plus", [0, 0, 1], angular_velocity=1e-7)
+    context, own = in_context(filaments, 1e5, pull=KT)
+    context.getIntegrator().step(40)
+    twists = own.twists(0)._value
+    assert twists.sum() == pytest.approx(40 * 1e5 * 1e-7)
+    # Friction lets the turns lag behind.
+    assert twists == pytest.approx(0.4 / 8 * np.array([0.5, *[1] * 7, 0.5]), rel=0.1)
+    assert positions_of(context)[:, :2] == pytest.approx(0.0, abs=1e-12)
+
+
+# Equilibrium
+
+
+@pytest.mark.parametrize("step", [1e2, 1e3, 1e4])
+def test_twist_of_free_chains(step):
+    """k_B T l0/C in each joint, independent of each other, at any step; bends are those of chains without."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    for number in range(16):
+        filaments.add_equilibrium(DNA, 8, number)
+    context, own = in_context(filaments, step)
+    variances, products, bends = [], [], []
+    context.getIntegrator().step(int(max(20, 4e4 / step)))
+    for _ in range(400):
+        context.getIntegrator().step(int(max(2, 2e3 / step)))
+        twists = np.array([own.twists(number)._value[1:-1] for number in range(16)])
+        variances.append((twists**2).mean(axis=1))
+        products.append((twists[:, 1:] * twists[:, :-1]).mean(axis=1))
+        vectors = np.diff(positions_of(context)[np.array(filaments.node_indices)], axis=1)
+        tangents = vectors / np.linalg.norm(vectors, axis=2)[..., None]
+        bends.append(1 - (tangents[:, 1:] * tangents[:, :-1]).sum(axis=2).mean(axis=1))
+    exact = theory.chain_twist_variance(DNA, TEMPERATURE)
+    assert exact == pytest.approx(LENGTH / 100)
+    assert_near(variances, exact)
+    mean, error = mean_and_error(np.array(products))
+    assert abs(mean) < SIGMAS * error and SIGMAS * error < 0.05 * exact
+    assert_near(bends, 1 - theory.mean_joint_cosine(DNA, TEMPERATURE))
+
+
+# Of Metropolis walks of the same chain with 64 inextensible segments, under 2 k_B T/nm with the last segment as here:
+# 1 - z/L of the middle, without torque and with 10 k_B T, and what the chain turns by writhe under it.
+SHORTENING, SHORTENING_UNDER_TORQUE, WRITHE = 0.04517, 0.05179, 0.724
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [1e4, 1e5, 1e6])
+@pytest.mark.parametrize("torque", [0.0, 10.0])
+def test_chain_under_tension_and_torque(torque, step):
+    """Extension and turns at any step over a factor of 100. Twist takes tau l0/C in each joint, and half of it in the
+    joint to the frame that is held."""
+    filaments = held_chains(16, 64, torque=torque * KT)
+    context, own = in_context(filaments, step, pull=2 * KT)
+    nodes = np.array(filaments.node_indices)
+    context.getIntegrator().step(int(max(100, 1e8 / step)))
+    shortenings, turns, twists = [], [], []
+    for _ in range(400):
+        context.getIntegrator().step(int(max(4, 4e5 / step)))
+        positions = positions_of(context)[nodes]
+        lengths = np.linalg.norm(np.diff(positions, axis=1), axis=2)
+        shortenings.append(1 - (positions[:, -4, 2] - positions[:, 4, 2]) / lengths[:, 4:-3].sum(axis=1))
+        of_joints = np.array([own.twists(number)._value for number in range(16)])
+        turns.append(-of_joints[:, -1])
+        twists.append((of_joints[:, 1:-1] - torque * LENGTH / 100).std(axis=1) ** 2)
+    mean, error = mean_and_error(np.array(shortenings))
+    exact = SHORTENING_UNDER_TORQUE if torque else SHORTENING
+    # Of the extension, 0.2 %: bends under tension are larger than they should be by 1 to 3 %, without twist as well.
+    assert mean == pytest.approx(exact, abs=0.0018) and SIGMAS * error < 0.05 * exact
+    mean, error = mean_and_error(np.array(turns))
+    assert mean == pytest.approx(torque * LENGTH * 63.5 / 100 + (WRITHE if torque else 0), abs=SIGMAS * error + 0.03)
+    assert error < 0.25
+    assert_near(twists, LENGTH / 100 * 62 / 63)
+
+
+@pytest.mark.slow
+def test_torque_of_chains_held_in_turns_is_that_of_the_closed_form():
+    """C_eff, at a step that is a hundred times longer than another, and from the writhe of nearly straight chains."""
+    turn, torques = 20.0, []
+    for step in (1e4, 1e6):
+        filaments = held_chains(16, 64)
+        context, own = in_context(filaments, step, pull=4 * KT)
+        for number in range(16):
+            own.set_twists(number, turn / 64 * np.array([0.5, *[1] * 63, 0.5]))
+        context.getIntegrator().step(int(max(200, 1e8 / step)))
+        samples = []
+        for _ in range(300):
+            context.getIntegrator().step(int(max(4, 4e5 / step)))
+            samples.append([own.twists(number)._value[1:-1].mean() * 100 / LENGTH for number in range(16)])
+        torques.append(mean_and_error(np.array(samples)))
+    chain = theory.twisted_chain(DNA, 4 * KT, 0.0, TEMPERATURE)
+    exact = chain.effective_torsional_rigidity / KT * turn / (64 * LENGTH)
+    for mean, error in torques:
+        assert error < 0.002 * exact
+        assert mean == pytest.approx(exact, rel=0.01)
+    assert torques[0][0] == pytest.approx(torques[1][0], abs=SIGMAS * np.hypot(torques[0][1], torques[1][1]) + 0.002)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [1e4, 1e5])
+def test_writhe_of_rings_follows_from_that_of_rings_without_twist(step):
+    """Lk is zero: each ring without twist has the weight exp(-2 pi^2 C Wr^2/k_B T L) there."""
+    segments, rings = 30, 16
+    means = {}
+    for kind in (UNTWISTED, DNA):
+        filaments = Filaments(VISCOSITY, TEMPERATURE)
+        for number in range(rings):
+            filaments.add_ring(kind, segments, [200.0 * number, 0, 0])
+        context, _ = in_context(filaments, step)
+        context.getIntegrator().step(int(2e7 / step))
+        squares = []
+        for _ in range(700):
+            context.getIntegrator().step(int(max(4, 4e5 / step)))
+            positions = positions_of(context)
+            squares.append([analysis.writhe(positions[nodes]) ** 2 for nodes in filaments.node_indices])
+        means[kind] = np.array(squares)
+    weights = np.exp(-2 * np.pi**2 * 100 / (segments * LENGTH) * means[UNTWISTED])
+    weighted = (weights * means[UNTWISTED]).mean(axis=0), weights.mean(axis=0)
+    expected = weighted[0].sum() / weighted[1].sum()
+    left_out = [np.delete(weighted[0], i).sum() / np.delete(weighted[1], i).sum() for i in range(rings)]
+    deviation = np.sqrt((rings - 1) * np.var(left_out))
+    mean, error = mean_and_error(means[DNA])
+    assert np.hypot(error, deviation) < 0.05 * expected
+    assert mean == pytest.approx(expected, abs=SIGMAS * np.hypot(error, deviation))
+    assert mean < 0.9 * means[UNTWISTED].mean()
+
+
+# Instabilities without noise
+
+
+@pytest.mark.parametrize(("share", "grows"), [(0.97, False), (1.03, True)])
+def test_ring_buckles_beyond_so_many_turns(share, grows):
+    """sqrt(3) A/C, of a ring with 60 segments."""
+    generator = np.random.default_rng(1)
+    filaments = Filaments(VISCOSITY / 100, 0.0)
+    filaments.add_ring(DNA, 60, [0, 0, 0])
+    context, own = in_context(filaments, 2e4)
+    context.setPositions(positions_of(context) + generator.normal(0.0, 1e-3, (60, 3)))
+    own.set_twists(0, np.full(60, 2 * np.pi * share * theory.ring_buckling_turns(DNA) / 60))
+    heights = []
+    # Other modes decay first.
+    for steps in (150, 200):
+        context.getIntegrator().step(steps)
+        nodes = positions_of(context)
+        heights.append(np.linalg.svd(nodes - nodes.mean(axis=0), compute_uv=False)[2])
+    assert (heights[1] > 1.2 * heights[0]) == grows and (heights[1] < heights[0] / 1.2) != grows
+
+
+@pytest.mark.parametrize(("share", "grows"), [(0.97, False), (1.03, True)])
+@pytest.mark.parametrize("step", [2e3, 2e4])
+def test_straight_chain_is_unstable_beyond_a_torque(share, grows, step):
+    """The torque in the middle of a long chain that is held straight at its ends."""
+    generator = np.random.default_rng(1)
+    filaments = Filaments(VISCOSITY, 0.0)
+    segments, pull = 200, 0.5 * KT
+    filaments.add_straight(DNA, segments, [0, 0, 0], [0, 0, 1], clamped=[0, 1])
+    filaments.add_end_frame(0, "minus", [0, 0, 1])
+    filaments.add_end_frame(0, "plus", [0, 0, 1])
+    context, own = in_context(filaments, step, pull=pull)
+    positions = positions_of(context)
+    positions[2:-2, :2] += generator.normal(0.0, 1e-4, (segments - 3, 2))
+    context.setPositions(positions)
+    twist = share * theory.critical_torque(DNA, pull) / DNA.twist_stiffness
+    own.set_twists(0, twist * np.array([0.5, *[1] * (segments - 1), 0.5]))
+    sizes = []
+    for time in (1e7, 1e7):
+        context.getIntegrator().step(int(time / step))
+        sizes.append(np.abs(positions_of(context)[20:-20, :2]).max())
+    assert (sizes[1] > 2 * sizes[0]) == grows and (sizes[1] < 0.9 * sizes[0]) != grows
+
+
+# What is compared with
+
+
+def test_writhe_and_linking_number():
+    """Of a circle, a torus knot and its mirror image, and of two circles through each other."""
+    angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    assert analysis.writhe(circle) == 0.0
+    knot = np.stack(
+        [np.sin(angle) + 2 * np.sin(2 * angle), np.cos(angle) - 2 * np.cos(2 * angle), np.sin(3 * angle)], axis=1
+    )
+    assert 3.2 < analysis.writhe(knot) < 3.5
+    assert analysis.writhe(knot * [1, 1, -1]) == pytest.approx(-analysis.writhe(knot))
+    assert analysis.writhe(knot * unit.angstrom) == pytest.approx(analysis.writhe(knot))
+    through = np.stack([1 + np.cos(angle + 0.1), 0 * angle, np.sin(angle + 0.1)], axis=1)
+    assert analysis.linking_number(circle, through) == pytest.approx(-1.0)
+    assert analysis.linking_number(circle, through[::-1]) == pytest.approx(1.0)
+    assert analysis.linking_number(circle, through + [5, 0, 0]) == pytest.approx(0.0, abs=1e-12)
+    # A right-handed ribbon winds around its axis to the right.
+    offset = np.cos(3 * angle)[:, None] * circle - np.sin(3 * angle)[:, None] * np.array([0, 0, 1.0])
+    assert analysis.linking_number(circle, circle + 0.05 * offset) == pytest.approx(3.0)
+    for nodes in (np.zeros((1, 3)), np.zeros(3), np.full((4, 3), np.nan)):
+        with pytest.raises(InputError):
+            analysis.writhe(nodes)
+        with pytest.raises(InputError):
+            analysis.linking_number(circle, nodes)
+
+
+def test_closed_forms():
+    """Numbers of A = 50 nm and C = 100 nm at 298 K, 0.5 pN and 8 pN nm, in segments of 5 nm and very short ones."""
+    kT = BOLTZMANN * 298
+    for length, shortening, stiffening in ((5.0, 0.21876, 1.574e-3), (0.01, 0.22072, 2.028e-3)):
+        kind = FilamentType(
+            torsional_rigidity=100 * kT,
+            friction_length=100.0,
+            **{**CHAIN, "segment_length": length, "bending_rigidity": 50 * kT},
+        )
+        force, torque = 0.5 * unit.piconewton, 8 * unit.piconewton * unit.nanometer
+        chain = theory.twisted_chain(kind, force, torque, 298 * unit.kelvin)
+        assert 1 - chain.relative_extension == pytest.approx(shortening, rel=2e-3)
+        compliance = kT / chain.effective_torsional_rigidity - 1 / 100
+        assert compliance == pytest.approx(stiffening, rel=2e-3)
+        twist = 8 * 0.602214076 / (100 * kT) * length / (2 * np.pi)
+        assert chain.turns_per_segment == pytest.approx(twist + chain.writhe_per_segment, rel=1e-3)
+    with pytest.raises(InputError, match="stable up to"):
+        theory.twisted_chain(DNA, KT, 20 * KT, TEMPERATURE)
+    assert theory.critical_torque(DNA, KT) == pytest.approx(KT * np.sqrt(4 * 50 + 25))
+    assert theory.ring_buckling_turns(DNA) == pytest.approx(0.866, rel=1e-3)
+    assert theory.chain_mean_turn_cosine(DNA, 20, TEMPERATURE) == pytest.approx(np.exp(-0.5))
+    for function, arguments in (
+        (theory.twisted_chain, (DNA, -1.0, 0.0, TEMPERATURE)),
+        (theory.twisted_chain, (DNA, 1.0, np.nan, TEMPERATURE)),
+        (theory.twisted_chain, (UNTWISTED, 1.0, 0.0, TEMPERATURE)),
+        (theory.critical_torque, (DNA, -1.0)),
+        (theory.chain_twist_variance, (F_ACTIN, TEMPERATURE)),
+        (theory.chain_mean_turn_cosine, (DNA, -1, TEMPERATURE)),
+    ):
+        with pytest.raises(InputError):
+            function(*arguments)
