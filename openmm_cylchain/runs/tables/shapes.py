@@ -120,6 +120,11 @@ class Region:
         """Of the box around it in nm: no two points of it are further apart."""
         return float(np.linalg.norm(self._upper - self._lower))
 
+    @property
+    def center(self):
+        """Of the box around it: (3,) in nm."""
+        return 0.5 * (self._lower + self._upper)
+
     def _bounds(self):
         shape = self._shape
         if isinstance(shape, Cylinder):
