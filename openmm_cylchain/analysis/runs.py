@@ -14,7 +14,7 @@ import numpy.typing as npt
 from ..couplings.beam_curves import BeamCurves
 from ..couplings.contact_frames import ContactFrame, DescribedContactFinder, joined_contacts
 from ..couplings.crosslink_records import CROSSLINK_RECORD, CrosslinkFrame, crosslinks_at
-from ..couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
+from ..couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, Torus
 from ..errors import InputError, PrecisionWarning
 from ..filaments.grown import GrownChain
 from ..output.dcd_frames import DCDFrames
@@ -36,6 +36,7 @@ _SHAPES = {
     "sphere": lambda point, vector, length: Sphere(point, length),
     "cylinder": Cylinder,
     "capsule": lambda point, vector, length: Capsule(point, vector, 2.0 * float(np.linalg.norm(vector)), length),
+    "torus": lambda point, vector, length: Torus(point, vector, float(np.linalg.norm(vector)), length),
     "box": lambda point, vector, length: Box(point, vector),
     "ellipsoid": lambda point, vector, length: Ellipsoid(point, vector),
 }
