@@ -210,6 +210,8 @@ class Run:
                     number = max(before, key=lambda i: own.filaments[i].nodes[0])
                     ends = 0 if own.filaments[number].ring else 1
                     filaments[particles] = number, (len(particles) - ends) // (len(own.filaments[number].nodes) - ends)
+                    if not len(nodes[number]):
+                        present[particles] = ()
         there = [
             replace(one, chains=tuple((present.get(chain[0], chain[0]), *chain[1:]) for chain in one.chains))
             for one in own.contacts

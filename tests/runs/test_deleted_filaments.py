@@ -215,3 +215,22 @@ def test_a_tether_that_is_taken_away_refuses_nothing():
     text = STAGED.replace("[[linkers]]", '[[tether]]\nfilament = 0\nnode = 0\nstiffness = "1 pN/nm"\n[[linkers]]', 1)
     configuration = parse_configuration(text + "filament.delete = { count = 2 }\ntether.active = false")
     assert any("thin: from" in line for line in dry_run(configuration))
+
+
+def test_beads_of_deleted_beams_touch_nothing(tmp_path):
+    """Two beams that overlap, of which one goes: its beads are still somewhere."""
+    beam = (
+        '[[filament]]\ntype = "MICROTUBULE"\nelement = "beam"\nsegment_length = "500 nm"\n'
+        'nodes = [["0 um", "{0} nm", "0 um"], ["0.5 um", "{0} nm", "0 um"], ["1 um", "{0} nm", "0 um"]]\n'
+    )
+    text = '[solvent]\ntemperature = "300 K"\nviscosity = "10 mPa*s"\n' + beam.format(0) + beam.format(20)
+    text += (
+        '[contacts]\ndiameter = "25 nm"\nrelax = false\n[simulation]\ntime_step = "0.1 us"\nseed = 1\nchecks = false\n'
+    )
+    text += (
+        'report_interval = "1 us"\n[[stage]]\nduration = "2 us"\n[[stage]]\nduration = "2 us"\nfilament.2.delete = {}\n'
+    )
+    run(parse_configuration(text), tmp_path / "out")
+    found = analysis.load(tmp_path / "out")
+    assert [len(found.contacts(frame).gaps) > 0 for frame in range(5)] == [True, True, True, False, False]
+    assert [len(own) for own in found.curves(4)] == [17, 0]
