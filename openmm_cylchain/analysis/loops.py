@@ -162,8 +162,8 @@ def _frames(run, frames):
 
 
 def _segment_length(run):
-    if any(own.monomer_length for own in run.filaments):
-        raise InputError("Filaments grow: their nodes are not the same places along them in all frames.")
+    if any(own.monomer_length for own in run.filaments) or run.passing:
+        raise InputError("Filaments grow, come or go: their nodes are not the same places along them in all frames.")
     lengths = {own.type.segment_length for own in run.filaments}
     if len(lengths) != 1:
         raise InputError(f"Filaments must have segments of one length, but have {sorted(lengths)} nm.")

@@ -155,11 +155,11 @@ def mesh_size(run: Run, volume: Scalar | None = None) -> float:
     Raises
     ------
     InputError
-        Without a periodic box and a volume, and where filaments grow, whose length changes.
+        Without a periodic box and a volume, and where filaments grow, come or go.
     """
     room = volume_of(run, volume)
-    if any(own.monomer_length for own in run.filaments):
-        raise InputError("Filaments grow, and the mesh size changes: take the lengths in Run.growth.")
+    if any(own.monomer_length for own in run.filaments) or run.passing:
+        raise InputError("Filaments grow, come or go, and the mesh size changes: take the lengths in Run.growth.")
     length = sum(float(own.type.segment_lengths(own.segments, own.ring).sum()) for own in run.filaments)
     return math.sqrt(3.0 * room / length)
 

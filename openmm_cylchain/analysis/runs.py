@@ -14,7 +14,7 @@ import numpy.typing as npt
 from ..couplings.beam_curves import BeamCurves
 from ..couplings.contact_frames import ContactFrame, DescribedContactFinder, joined_contacts
 from ..couplings.crosslink_records import CROSSLINK_RECORD, CrosslinkFrame, crosslinks_at
-from ..couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
+from ..couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, Torus
 from ..errors import InputError, PrecisionWarning
 from ..filaments.grown import GrownChain
 from ..output.dcd_frames import DCDFrames
@@ -36,6 +36,7 @@ _SHAPES = {
     "sphere": lambda point, vector, length: Sphere(point, length),
     "cylinder": Cylinder,
     "capsule": lambda point, vector, length: Capsule(point, vector, 2.0 * float(np.linalg.norm(vector)), length),
+    "torus": lambda point, vector, length: Torus(point, vector, float(np.linalg.norm(vector)), length),
     "box": lambda point, vector, length: Box(point, vector),
     "ellipsoid": lambda point, vector, length: Ellipsoid(point, vector),
 }
@@ -209,6 +210,8 @@ class Run:
                     number = max(before, key=lambda i: own.filaments[i].nodes[0])
                     ends = 0 if own.filaments[number].ring else 1
                     filaments[particles] = number, (len(particles) - ends) // (len(own.filaments[number].nodes) - ends)
+                    if not len(nodes[number]):
+                        present[particles] = ()
         there = [
             replace(one, chains=tuple((present.get(chain[0], chain[0]), *chain[1:]) for chain in one.chains))
             for one in own.contacts
@@ -386,10 +389,20 @@ class Run:
 
     @property
     def passing(self) -> frozenset[int]:
-        """The numbers of filaments that are not there in some frame: that begin, vanish, or are parts of others."""
+        """The numbers of filaments that are not there in some frame: that begin or vanish, are parts of others, or are
+        not in all stages."""
         counts = self.growth.get("nodes", np.ones((0, 0)))
         gone = np.flatnonzero((counts == 0).any(axis=0))
-        return frozenset(int(number) for number in self.growth["filament"][0][gone]) if len(gone) else frozenset()
+        grown = {int(number) for number in self.growth["filament"][0][gone]} if len(gone) else set()
+        return frozenset(grown.union(*map(self._absent, range(len(self)))))
+
+    def _absent(self, frame):
+        # Of filaments that do not grow, the numbers of those that a stage does not have: all particles in one place.
+        if not self._description.stages:
+            return frozenset()
+        positions = self.positions(frame)
+        fixed = ((number, own.nodes) for number, own in enumerate(self.filaments) if not own.monomer_length)
+        return frozenset(number for number, nodes in fixed if np.all(positions[nodes] == positions[nodes[0]]))
 
     def monomers(self, frame: int) -> dict[int, IntArray]:
         """The number of the first monomer of filaments that grow, and that behind the last one, in a frame.
@@ -407,6 +420,8 @@ class Run:
         nodes = [own.nodes for own in self.filaments]
         for number, chain in self.grown(frame).items():
             nodes[number] = nodes[number][: chain.nodes]
+        for number in self._absent(frame):
+            nodes[number] = nodes[number][:0]
         return nodes
 
     def grown(self, frame: int) -> dict[int, GrownChain]:
@@ -427,6 +442,8 @@ class Run:
         positions, per_element = self.positions(frame), whole_number(per_element, 1, "per_element", 10**6)
         return [
             own.type.segment_kind.curve(positions[nodes], positions[own.control_points], per_element, own.ring)
+            if len(nodes)
+            else np.zeros((0, 3))
             for own, nodes in zip(self.filaments, self._nodes_in(frame))
         ]
 
@@ -438,6 +455,8 @@ class Run:
         positions = self.positions(frame)
         return [
             own.type.segment_kind.angles(positions[nodes], positions[own.control_points], own.ring)
+            if len(nodes)
+            else np.zeros(0)
             for own, nodes in zip(self.filaments, self._nodes_in(frame))
         ]
 
@@ -462,7 +481,7 @@ class Run:
         Raises
         ------
         InputError
-            For an average over frames in which filaments that grow have other segments.
+            For an average over frames in which filaments that grow have other segments, or others come or go.
         """
         frame, average = self._frame(frame), whole_number(average, 1, "average")
         first = max(0, frame - (average - 1) // 2)
@@ -470,10 +489,15 @@ class Run:
         self.warn_of_rounding()
         if len(frames) > 1 and self.growth:
             raise InputError("Segments of filaments that grow come and go: take tensions of single frames, average=1.")
-        totals = [np.zeros(own.segments) for own in self.filaments]
+        absent = self._absent(frame)
+        if any(self._absent(each) != absent for each in frames):
+            raise InputError("Filaments come or go in these frames: take tensions of fewer, average=1.")
+        totals = [np.zeros(0 if number in absent else own.segments) for number, own in enumerate(self.filaments)]
         for each in frames:
             positions, grown = self.positions(each), self.grown(each)
             for number, own in enumerate(self.filaments):
+                if number in absent:
+                    continue
                 parts = positions[own.nodes], positions[own.control_points]
                 if number in grown:
                     totals[number] = grown[number].tensions

@@ -75,11 +75,12 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
     chains, free = np.zeros((3, 3)), np.zeros(3)
     positions = run.positions(frame)
     grown = run.grown(frame) if any(own.monomer_length for own in run.filaments) else {}
-    for number, own in enumerate(run.filaments):
-        nodes = len(own.nodes)
+    for number, (own, there) in enumerate(zip(run.filaments, run.nodes(frame))):
+        nodes = len(there)
+        if not nodes:
+            continue
         if number in grown:
             chains += grown[number].virial
-            nodes = grown[number].nodes
         else:
             parts = positions[own.nodes], positions[own.control_points]
             chains += own.type.segment_kind.virial(chain_of(own, run.temperature), *parts)

@@ -1,4 +1,4 @@
-"""Shapes that walls have: planes, slabs, spheres, cylinders, capsules, boxes and ellipsoids."""
+"""Shapes that walls have: planes, slabs, spheres, cylinders, capsules, tori, boxes and ellipsoids."""
 
 from __future__ import annotations
 
@@ -331,6 +331,68 @@ class Capsule(Face):
 
 
 @dataclass(frozen=True)
+class Torus(Face):
+    """The inside of a torus: a tube around a circle.
+
+    With the distances ``rho`` from the axis and ``z`` along it, from the center, its depth is
+    ``((rho - R)^2 + z^2)^(1/2) - r``.
+
+    Parameters
+    ----------
+    center : (3,) length
+    axis : (3,) array
+        At right angles to the plane of the circle.
+    major_radius : length
+        R, of the circle in the middle of the tube.
+    minor_radius : length
+        r, of the tube: smaller than that of the circle.
+    """
+
+    center: FloatArray
+    axis: FloatArray
+    major_radius: float
+    minor_radius: float
+
+    if TYPE_CHECKING:
+
+        def __init__(self, center: Vector, axis: Vector, major_radius: Scalar, minor_radius: Scalar) -> None: ...
+
+    def __post_init__(self) -> None:
+        _set(self, "center", vector(self.center, LENGTH, "Torus: center"))
+        _set(self, "axis", unit_vector(self.axis, "Torus"))
+        _set(self, "major_radius", positive(self.major_radius, LENGTH, "Torus: major_radius"))
+        _set(self, "minor_radius", positive(self.minor_radius, LENGTH, "Torus: minor_radius"))
+        if self.minor_radius >= self.major_radius:
+            raise InputError(
+                f"Torus: minor_radius must be smaller than major_radius, {self.major_radius:g} nm, but is "
+                f"{self.minor_radius:g} nm: there is no hole then. Take a Sphere or an Ellipsoid."
+            )
+
+    @property
+    def expression(self) -> str:
+        directions = (*directions_across(self.axis), self.axis)
+        first, second, along = (_along(self.center, direction) for direction in directions)
+        radial = f"(sqrt({first}^2+{second}^2+{_TINY})-{number(self.major_radius)})"
+        return _beyond(f"sqrt({radial}^2+{along}^2+{_TINY})-{number(self.minor_radius)}")
+
+    @property
+    def region(self) -> Region:
+        return ("torus", self.center, self.major_radius * self.axis, self.minor_radius)
+
+    @property
+    def room(self) -> float:
+        return self.minor_radius
+
+    def _depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        relative = positions - self.center
+        across = relative - (relative @ self.axis)[..., None] * self.axis
+        distances, outward = _radial(across, 0.0)
+        # On the axis, all of the circle is as near.
+        outward = np.where(distances[..., None] > 0.0, outward, directions_across(self.axis)[0])
+        return _radial(relative - self.major_radius * outward, self.minor_radius)
+
+
+@dataclass(frozen=True)
 class Box(Shape):
     """The inside of a box with edges along the axes; d is the distance from the box.
 
@@ -436,7 +498,7 @@ class Ellipsoid(Face):
         return depths, rise[..., None] * of_square - (0.5 * depths / steepness)[..., None] * of_steepness
 
 
-ClosedShape = Box | Sphere | Ellipsoid | Capsule
+ClosedShape = Box | Sphere | Ellipsoid | Capsule | Torus
 
 
 def _set(instance, name, value):
@@ -447,6 +509,9 @@ def bounds_of(shape: ClosedShape) -> tuple[FloatArray, FloatArray]:
     """Two opposite corners (3,) in nm of the box around a shape that is closed."""
     if isinstance(shape, Box):
         return shape.lower, shape.upper
+    if isinstance(shape, Torus):
+        reach = shape.minor_radius + shape.major_radius * np.sqrt(1.0 - shape.axis**2)
+        return shape.center - reach, shape.center + reach
     reach = shape.semi_axes if isinstance(shape, Ellipsoid) else np.full(3, shape.radius)
     if isinstance(shape, Capsule):
         reach = reach + 0.5 * shape.length * np.abs(shape.axis)
@@ -457,5 +522,7 @@ def volume_of(shape: ClosedShape) -> float:
     """The volume in nm^3 of a shape that is closed."""
     if isinstance(shape, Capsule):
         return math.pi * shape.radius**2 * (shape.length + 4.0 / 3.0 * shape.radius)
+    if isinstance(shape, Torus):
+        return 2.0 * math.pi**2 * shape.major_radius * shape.minor_radius**2
     lower, upper = bounds_of(shape)
     return float(np.prod(upper - lower)) * (1.0 if isinstance(shape, Box) else np.pi / 6.0)

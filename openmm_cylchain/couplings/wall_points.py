@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..mechanics.geometry import directions_across
 from ..units.quantities import LENGTH, vector, whole_number, whole_numbers
 from ..units.types import FloatArray, Vector
-from .shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
+from .shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, Torus
 
 _MOST_DRAWS = 10**7
 """Points that may be drawn for one on a part of the wall."""
@@ -29,7 +29,7 @@ def random_points_on(
 
     Parameters
     ----------
-    wall : Plane, Slab, Sphere, Cylinder, Capsule, Box or Ellipsoid
+    wall : Plane, Slab, Sphere, Cylinder, Capsule, Torus, Box or Ellipsoid
     count : int
     seed : int, or several
     lower, upper : (3,) length, optional
@@ -116,6 +116,17 @@ def _on_capsule(capsule, count, generator, low, high):
     return capsule.center + height * along + capsule.radius * np.where(on_caps, normals, across)
 
 
+def _on_torus(torus, count, generator, low, high):
+    # An area grows with the distance from the axis.
+    around, about = generator.uniform(0.0, 2.0 * np.pi, (2, count))
+    distances = torus.major_radius + torus.minor_radius * np.cos(about)
+    kept = generator.uniform(size=count) * (torus.major_radius + torus.minor_radius) < distances
+    first, second = directions_across(torus.axis)
+    outward = np.cos(around)[:, None] * first + np.sin(around)[:, None] * second
+    places = distances[:, None] * outward + torus.minor_radius * np.sin(about)[:, None] * torus.axis
+    return torus.center + places[kept]
+
+
 def _on_ellipsoid(ellipsoid, count, generator, low, high):
     # Of the unit sphere, an area grows with |n/a| a b c for its direction n and the semi-axes.
     directions = _directions(count, generator)
@@ -140,6 +151,7 @@ _SAMPLERS = {
     Sphere: _on_sphere,
     Cylinder: _on_cylinder,
     Capsule: _on_capsule,
+    Torus: _on_torus,
     Box: _on_box,
     Ellipsoid: _on_ellipsoid,
 }

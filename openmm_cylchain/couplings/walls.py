@@ -19,7 +19,7 @@ from ..filaments.collection import FilamentCollection, require_filaments
 from ..units.quantities import LENGTH, STIFFNESS, in_units_of, one_of, positive, shown, whole_numbers
 from ..units.types import FloatArray, Indices, Numbers, Scalar
 from .contacts import outside_particles
-from .shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, number
+from .shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, Torus, number
 
 WALL_NAME = "Wall"
 
@@ -217,13 +217,14 @@ def shape_of_wall(force: openmm.Force) -> tuple[Shape, float] | None:
 # As number() writes them.
 _NUMBER = re.compile(r"\((-?[0-9][-+.e0-9]*)\)")
 
-# Shapes from the numbers in their formulas. Of a cylinder and a capsule, there are two directions across the axis.
+# Shapes from the numbers in their formulas. There are two directions across an axis.
 _READ: dict[str, Callable[[FloatArray], Shape]] = {
     "plane": lambda v: Plane(v[1:6:2], v[0:6:2]),
     "slab": lambda v: Slab(v[1:6:2], v[0:6:2], 2.0 * v[6]),
     "sphere": lambda v: Sphere(v[:3], v[3]),
     "cylinder": lambda v: Cylinder(v[1:6:2], np.cross(v[0:6:2], v[6:12:2]), v[12]),
     "capsule": lambda v: Capsule(v[1:6:2], v[12:18:2], 2.0 * v[18], v[19]),
+    "torus": lambda v: Torus(v[1:6:2], v[13:19:2], v[12], v[19]),
     "box": lambda v: Box(v[0:6:2], v[1:6:2]),
     "ellipsoid": lambda v: Ellipsoid(v[1:7:2], v[2:7:2] ** -0.5),
 }

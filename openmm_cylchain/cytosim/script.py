@@ -1,7 +1,7 @@
 """What a configuration of Cytosim does: its commands, followed one after the other up to each of its runs.
 
-Runs between which values change, linkers come and go, or fibers come are stages of one run of ours. Runs between which
-fibers go, are cut or come and grow are of different parts, of which the longest is taken.
+Runs between which values change, linkers and fibers come and go are stages of one run of ours. Runs between which
+fibers are cut, go by where they are, or come and grow are of different parts, of which the longest is taken.
 """
 
 import math
@@ -56,7 +56,8 @@ class Script:
     ``later`` are the Scripts of the runs that follow, as stages of one run; ``stages`` are (line, sentence, what it
     needs) of what is left out of others, ``choices`` (line, sentence) of what was chosen in a template. ``broken`` is
     (line, sentence) of what has happened to filaments since the run before, and ``unbound`` which of the hands that are
-    not bound have taken their linkers away since then, by names.
+    not bound have taken their linkers away since then, by names. Fibers that are deleted stay in ``created``:
+    ``deleted`` are (number, count), which of those that have created fibers, and how many go, None for all.
     """
 
     simul: Settings = field(default_factory=lambda: Settings("simul", 1))
@@ -69,6 +70,7 @@ class Script:
     later: list = field(default_factory=list)
     broken: list = field(default_factory=list)
     unbound: dict = field(default_factory=dict)
+    deleted: list = field(default_factory=list)
     frames: int = 0
 
     @property
@@ -149,12 +151,13 @@ class _Follower:
         if not parts:
             return self._replayed(len(self._actions))
         chosen = max(parts, key=lambda part: sum(run["steps"] for run in part))
-        scripts, notes, unbound = [], 0, {}
+        scripts, notes, unbound, deleted = [], 0, {}, 0
         for run in chosen:
             own = self._replayed(run["number"])
             own.run, own.steps, own.frames = run["settings"], run["steps"], run["frames"]
             between, notes = own.stages[notes:], len(own.stages)
             own.stages = between if scripts else []
+            own.deleted, deleted = own.deleted[deleted:], len(own.deleted)
             own.unbound, unbound = {k: v for k, v in own.unbound.items() if v != unbound.get(k)}, own.unbound
             scripts.append(own)
         first, *first.later = scripts
@@ -229,8 +232,15 @@ class _Follower:
             name = words[-1] if words else "*"
             every = [new for new in script.created if name in (new.name, new.kind, "*")]
             every = [new for new in every if mark is None or new.settings.text("mark") == mark]
-            if any(new.kind == "fiber" for new in every):
+            fibers = [new for new in every if new.kind == "fiber"]
+            if fibers and (conditions or _begins_fibers(script)):
                 script.broken.append((command.line, what))
+            elif fibers:
+                known = [new for new in script.created if new.kind == "fiber"]
+                if count is not None and len(fibers) > 1:
+                    script.stages.append((command.line, f"{what}: of those that are first in the file", None))
+                _delete_fibers(script, fibers, known, count)
+                every = [new for new in every if new.kind != "fiber"]
             if conditions and set(conditions) <= {"state1", "state2"} and count is None:
                 for key in conditions:
                     if settings.text(key) == "0":
@@ -396,6 +406,27 @@ class _Follower:
             raise ScriptError(command.line, f"in {command.words[0]}, {error}") from None
 
     _do_include = _do_read
+
+
+def _begins_fibers(script):
+    # Whether events or hands create fibers during a run, which are of tables of their own.
+    hands = (own.settings for own in script.properties.values() if own.kind == "hand")
+    return any(new.kind == "event" for new in script.created) or any(
+        settings.peek("activity") == "nucleate" for settings in hands
+    )
+
+
+def _delete_fibers(script, fibers, known, count):
+    for new in fibers:
+        number = next(place for place, own in enumerate(known) if own is new)
+        if count is None or isinstance(new.count, str):
+            script.deleted.append((number, count))
+            continue
+        gone = sum(of or new.count for own, of in script.deleted if own == number)
+        going = min(count, max(0, new.count - gone))
+        if going:
+            script.deleted.append((number, going))
+        count -= going
 
 
 def _grows(fiber):

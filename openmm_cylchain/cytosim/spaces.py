@@ -22,6 +22,8 @@ _NAMES = {
 _FLAT = 1.0
 """Half the thickness in um of walls and regions around a plane, in which nothing is at another height."""
 _DRAWS = 100_000
+_IN_LINE = 1e-9
+"""Angle by which sides of a polygon turn that are in a line."""
 
 
 @dataclass
@@ -298,7 +300,14 @@ def _torus(sizes, dimensions):
         return (np.hypot(at[..., 0], at[..., 1]) - ring) ** 2 + at[..., 2] ** 2 <= radius**2
 
     volume = 4 * math.pi * ring * radius if dimensions == 2 else 2 * math.pi**2 * ring * radius**2
-    return Space("torus", _flat([ring + radius, ring + radius, radius], dimensions), inside, volume)
+    sizes_of_box = _flat([ring + radius, ring + radius, radius], dimensions)
+    if radius >= ring:
+        return Space("torus", sizes_of_box, inside, volume)
+    shape = {"shape": "torus", "axis": [0, 0, 1]}
+    shape |= {"major_radius": quantity(ring, "um"), "minor_radius": quantity(radius, "um")}
+    # Planar filaments begin where their plane cuts it, which is drawn point by point.
+    region = None if dimensions == 2 else shape
+    return Space("torus", sizes_of_box, inside, volume, None, [shape], region)
 
 
 def _polygon(sizes, dimensions):
@@ -318,10 +327,39 @@ def _polygon(sizes, dimensions):
         within = np.sum(crosses & (x < where), -1) % 2 == 1
         return within & (np.abs(at[..., 2]) <= 0.5 * height)
 
-    area = 0.5 * abs(float(np.sum(first[:, 0] * last[:, 1] - last[:, 0] * first[:, 1])))
+    signed = 0.5 * float(np.sum(first[:, 0] * last[:, 1] - last[:, 0] * first[:, 1]))
+    area = abs(signed)
     half, middle = np.array([*(0.5 * (high - low)), 0.5 * height]), np.array([*(0.5 * (high + low)), 0.0])
     volume = area if dimensions == 2 else area * height
-    return Space("polygon", half, inside, volume, middle=middle)
+    return Space("polygon", half, inside, volume, None, _sides(first, last, signed, height), middle=middle)
+
+
+def _sides(first, last, area, height):
+    # Those of a prism over a convex polygon, and of no other: None. Corners in a line have one side.
+    ways = (last - first) * np.sign(area)
+    lengths = np.linalg.norm(ways, axis=1, keepdims=True)
+    if not np.all(lengths > 0.0):
+        return None
+    ways = ways / lengths
+    following = np.roll(ways, -1, axis=0)
+    turns = np.arctan2(ways[:, 0] * following[:, 1] - ways[:, 1] * following[:, 0], np.sum(ways * following, axis=1))
+    if np.sign(area) < 0.0:
+        # The sides come one after the other the other way round.
+        turns = -turns
+    if np.any(turns < -_IN_LINE) or not math.isclose(float(turns.sum()), 2.0 * math.pi, rel_tol=1e-6):
+        return None
+    walls = [
+        {
+            "shape": "plane",
+            "point": point([*corner, 0.0]),
+            "normal": [round(-float(way[1]), 12) + 0.0, round(float(way[0]), 12) + 0.0, 0],
+        }
+        for corner, way, turn in zip(first, ways, np.roll(turns, 1))
+        if turn > _IN_LINE
+    ]
+    if height:
+        walls.append({"shape": "slit", "point": point([0.0] * 3), "thickness": quantity(height, "um")})
+    return walls
 
 
 def _dice(sizes, dimensions):

@@ -22,7 +22,7 @@ _PLACES = ("position", "inside", "direction", "orientation", "nodes", "tangents"
 _NEEDS = "stages: {}"
 
 
-def add_stages(document, later, runs, unbound):
+def add_stages(document, later, runs, unbound, deleted):
     """Make a Document of the first run one of all.
 
     Parameters
@@ -35,6 +35,8 @@ def add_stages(document, later, runs, unbound):
         Those of all runs.
     unbound : list of dict
         Of later runs: which unbound hands have taken their linkers away before, by names.
+    deleted : list of dict
+        Of later runs: how many filaments go before, None for all, by numbers of their tables.
     """
     stages = [_plain(own) for own in (document, *later)]
     simulation = document.tables_called("[simulation]")[0]
@@ -57,7 +59,7 @@ def add_stages(document, later, runs, unbound):
         table.add("name", f"run {number + 1}")
         table.add("duration", duration, Note(EXACT, f"run {number + 1}", run.line))
         if number:
-            _add_changes(document, stages[number - 1], own, run.line, unbound[number - 1])
+            _add_changes(document, stages[number - 1], own, run.line, unbound[number - 1], deleted[number - 1])
 
 
 def _plain(document):
@@ -177,7 +179,7 @@ def _name_all_held(stages, document):
             table.add("holds", stages[0]["wall"][index]["holds"], Note(EXACT, "all"))
 
 
-def _add_changes(document, before, after, line, unbound):
+def _add_changes(document, before, after, line, unbound, deleted):
     for name in dict.fromkeys((*before, *after)):
         if name in ("title", "stage"):
             continue
@@ -199,6 +201,8 @@ def _add_changes(document, before, after, line, unbound):
                     if len(gone) == 1:
                         text = f"{second['name']} that go if {', '.join(gone)} = 0: here if no hand is bound"
                         document.note(NEAREST, text, line)
+            if name == "filament" and index in deleted:
+                change["delete"] = {} if deleted[index] is None else {"count": deleted[index]}
             if change:
                 _add_table(document, f"[stage.{name}.{index + 1}]" if name in _REPEATED else f"[stage.{name}]", change)
 

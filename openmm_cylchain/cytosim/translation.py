@@ -67,6 +67,8 @@ class Translation:
         # Places on filaments of linkers that begin there, by the names of singles and couples.
         self.attached = {}
         self.growings, self.made, self.filament_count, self.start_files = [], [], 0, {}
+        # The numbers of the tables of each New of fibers.
+        self.tables_of_fibers = []
         self._spaces, self._type_names = {}, {}
         self.dimensions = self._find_dimensions(dimensions)
         self.contact_diameter = contact_diameter(script)
@@ -173,16 +175,17 @@ class Translation:
         self._translate_run()
         if self.script.later:
             stem, dimensions, folder = self._path
-            later = []
+            later, deleted = [], []
             for script in self.script.later:
                 own = Translation(script, self.document.title, stem, dimensions, folder, self.duration)
                 own._translate_run()
                 later.append(own.document)
+                deleted.append(_deletions(script, own.tables_of_fibers))
                 # Those of filaments that come later.
                 self.start_files.update({**own.start_files, **self.start_files})
                 self.made = max(self.made, own.made, key=len)
             unbound = [own.unbound for own in self.script.later]
-            add_stages(self.document, later, [own.run for own in (self.script, *self.script.later)], unbound)
+            add_stages(self.document, later, [own.run for own in (self.script, *self.script.later)], unbound, deleted)
 
     def _translate_run(self):
         # What is there when a run begins.
@@ -192,7 +195,9 @@ class Translation:
         linked = []
         for new in self.script.created:
             if new.kind == "fiber":
+                before = len(self.document.tables_called("[[filament]]"))
                 add_filaments(self, new)
+                self.tables_of_fibers.append(range(before, len(self.document.tables_called("[[filament]]"))))
             elif new.kind in ("single", "couple"):
                 linked.append((new, len(self.made), len(self.bodies)))
             elif new.kind == "event":
@@ -269,6 +274,17 @@ class Translation:
                 "there are neither fibers nor bodies in it, and a run of ours has some"
                 + (f". It would need: {missing}." if missing else ".")
             )
+
+
+def _deletions(script, tables):
+    # By numbers of [[filament]] tables: how many go as the run begins, None for all.
+    found = {}
+    for number, count in script.deleted:
+        own = tables[number]
+        for place, table in enumerate(own):
+            share = None if count is None else (count + len(own) - 1 - place) // len(own)
+            found[table] = None if share is None or found.get(table, 0) is None else found.get(table, 0) + share
+    return {table: count for table, count in found.items() if count != 0}
 
 
 def translate(path, stem, dimensions=None, given=None):

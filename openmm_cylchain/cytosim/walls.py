@@ -31,7 +31,7 @@ _OF_BODIES = {
 """Modes of confine as side and nodes of a wall."""
 _WHOLE = "all_inside"
 """The mode in which bodies are confined with their spheres: in others, with their centres."""
-_ONE_FACE = ("sphere", "cylinder", "capsule", "ellipsoid")
+_ONE_FACE = ("sphere", "cylinder", "capsule", "torus", "ellipsoid")
 
 
 class _Confinement(NamedTuple):
@@ -120,6 +120,8 @@ def _add_wall(translation, own, whole, held, every):
         for key, value in wall.items():
             table.add(key, value, Note(EXACT, f"confine, {own.stiffness:g}" if key == "shape" else "", line))
         table.add("stiffness", quantity(own.stiffness, "pN/um"), Note(EXACT, "of each node"))
+        if space.shape == "polygon" and wall["shape"] == "plane":
+            table.comment(Note(NEAREST, "what is beyond a corner is pushed by both sides, each by its own distance"))
         if side != "inside":
             table.add("side", side)
             if side == "outside" and len(space.walls) > 1:

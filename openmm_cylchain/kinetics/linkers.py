@@ -37,7 +37,7 @@ LARGEST_REACH_OF_WIDTH = 10.0
 LARGEST_EXPONENT_AT_REACH = 3.0
 """By which exponent binding may be slower everywhere within reach of a spring of rest length before it is warned of."""
 
-_CLOSED = ("sphere", "box", "ellipsoid", "capsule")
+_CLOSED = ("sphere", "box", "ellipsoid", "capsule", "torus")
 """Regions of walls that have a volume."""
 
 
@@ -205,9 +205,9 @@ def _refuse_without_region(linkers, system):
         walls = [wall for side, wall in sides if side == "inside" or (side == "outside" and wall[0] == "plane")]
     if not is_closed(walls, system.usesPeriodicBoundaryConditions()):
         raise InputError(
-            f"Linkers {linkers.kind.name!r} diffuse, and need a region: give add_linkers one (a Sphere, Box, Capsule "
-            "or Ellipsoid, or a Cylinder with a Slab across it), add a filament_wall_force of such a shape to the "
-            "System, or give that box_vectors, in which there may be a Slab or a Cylinder."
+            f"Linkers {linkers.kind.name!r} diffuse, and need a region: give add_linkers one (a Sphere, Box, Capsule, "
+            "Torus or Ellipsoid, or a Cylinder with a Slab across it), add a filament_wall_force of such a shape to "
+            "the System, or give that box_vectors, in which there may be a Slab or a Cylinder."
         )
 
 

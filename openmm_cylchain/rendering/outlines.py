@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..analysis.runs import Run
-from ..couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere
+from ..couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere, Torus
 from ..mechanics.geometry import directions_across
 from ..units.types import FloatArray
 
@@ -47,6 +47,8 @@ def _outline(wall, points):
         return outlines
     if isinstance(wall, Capsule):
         return _outline_of_capsule(wall)
+    if isinstance(wall, Torus):
+        return _outline_of_torus(wall)
     if isinstance(wall, Cylinder):
         heights = (points - wall.point) @ wall.axis
         places = np.linspace(heights.min(), heights.max(), 7)
@@ -67,6 +69,18 @@ def _outline_of_capsule(wall):
         other = half + np.cos(quarter) * wall.radius * wall.axis - np.sin(quarter) * side
         rings.append(wall.center + np.concatenate([cap, -other[::-1], -cap, other[::-1]]))
     return rings
+
+
+def _outline_of_torus(wall):
+    # Four circles along the tube, and eight around it.
+    circle, tube, lines = _circle(wall.axis), wall.minor_radius, []
+    for along, across in ((tube, 0.0), (-tube, 0.0), (0.0, tube), (0.0, -tube)):
+        lines.append(wall.center + (wall.major_radius + across) * circle + along * wall.axis)
+    angles = np.linspace(0.0, 2.0 * np.pi, _ROUND + 1)[:, None]
+    for outward in circle[: -1 : _ROUND // 8]:
+        ring = np.cos(angles) * outward + np.sin(angles) * wall.axis
+        lines.append(wall.center + wall.major_radius * outward + tube * ring)
+    return lines
 
 
 def _circle(normal):

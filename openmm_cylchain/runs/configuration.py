@@ -195,8 +195,12 @@ def configuration_of(entries, text, folder, lines):
     """
     try:
         if STAGE.name in entries:
-            return _staged(entries, lambda raw: _configuration(raw, text, Path(folder), lines))
-        return _configuration(entries, text, Path(folder), lines)
+            found = _staged(entries, lambda raw: _configuration(raw, text, Path(folder), lines))
+        else:
+            found = _configuration(entries, text, Path(folder), lines)
+        for own in found.tables["filament"]:
+            own.refuse(("delete",), "belongs to a [[stage]] behind the first one: write [stage.filament] there.")
+        return found
     except UnknownKeyError as error:
         raise error.with_suggestion(_OWNERS).with_line(lines) from None
     except ConfigurationError as error:

@@ -14,16 +14,16 @@ from .relaxation import relaxed_positions
 
 
 @located_errors
-def create_simulation(configuration, begun=None, number=0):
+def create_simulation(configuration, begun=None, number=0, deleted=frozenset()):
     """The Simulation of a configuration, without positions, and its BuiltSystem.
 
-    Of a stage of a run, with the Filaments of the first one, whose places are taken, and its number; what has noise of
-    its own in each Context gets another seed in each.
+    Of a stage of a run, with the Filaments of the first one, whose places are taken, its number, and the numbers of
+    filaments that have been deleted; what has noise of its own in each Context gets another seed in each.
 
     InputError if it cannot be built, or the platform cannot simulate it.
     """
     settings = configuration.simulation
-    built = build_system(configuration, settings.engine, settings.seed, begun=begun)
+    built = build_system(configuration, settings.engine, settings.seed, begun=begun, deleted=deleted)
     filaments = built.filaments
     refuse_countless_events(configuration, filaments)
     platform, properties = platform_of(settings, filaments.engine)
@@ -42,9 +42,9 @@ def create_simulation(configuration, begun=None, number=0):
         raise refusal(error, built.system, integrator, platform) from None
 
 
-def stage_simulation(stage, first):
+def stage_simulation(stage, first, deleted=frozenset()):
     """The same of a Stage; ``first`` is that of the first one, whose filaments begin where these do."""
-    return create_simulation(stage.configuration, first[1].filaments, stage.number)
+    return create_simulation(stage.configuration, first[1].filaments, stage.number, deleted)
 
 
 @located_errors

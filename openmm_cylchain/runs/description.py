@@ -28,7 +28,8 @@ def describe(configuration, filaments, system, topology):
         topology=topology,
         diameters=dict(enumerate(diameters, system.getNumParticles() - len(diameters))),
     )
-    described = zip(description.filaments, loads_of_filaments(configuration))
+    groups = (group for group in configuration.filaments for _ in range(group.count))
+    described = zip(description.filaments, loads_of_filaments(configuration), groups)
     stages = [
         DescribedStage(
             own.name,
@@ -40,9 +41,12 @@ def describe(configuration, filaments, system, topology):
         )
         for own in configuration.stages
     ]
-    return replace(
-        description, stages=tuple(stages), filaments=tuple(replace(own, load=load) for own, load in described)
-    )
+    return replace(description, stages=tuple(stages), filaments=tuple(_described(*own) for own in described))
+
+
+def _described(own, load, group):
+    # Of one that comes later, what is clamped then.
+    return replace(own, load=load, clamped=tuple(group.clamped), clamped_tangents=tuple(group.clamped_tangents))
 
 
 def loads_of_filaments(configuration):

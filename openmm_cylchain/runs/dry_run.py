@@ -9,13 +9,13 @@ from ..kinetics.branching import Branching
 from ..output.run_tables import ENERGY_COLUMNS, GROWTH_TABLE_COLUMNS, LINKER_TABLE_COLUMNS
 from ..units.text import format_time
 from .configuration import linker_labels, named_bound
-from .created_simulation import begin, create_simulation, stage_simulation
+from .created_simulation import begin, create_simulation
 from .errors_of_tables import located_instability
 from .growth_summary import ENDS, MICROMOLAR, free_rate, populations
 from .initial_state import box_vectors, recommended_step
 from .run import Recorder, steps
 from .run_directory import RunDirectory
-from .stage_transition import carry_over
+from .stage_transition import following_simulation
 from .stages import named_stages, naming_stage, stages_of, time_steps_in_words
 from .steady_populations import steady_population
 from .summary import group_labels, group_members
@@ -44,7 +44,7 @@ def dry_run(configuration):
         f"{built.filaments.engine} engine, platform {simulation.context.getPlatform().getName()}"
     )
     yield f"  recommended {format_time(recommended.step)}: {_binding(configuration, recommended)}"
-    yield from _cost(configuration, stages, simulation, built.filaments)
+    yield from _cost(configuration, stages, simulation, built)
     if len(stages) > 1:
         yield from _stages(stages, (simulation, built))
 
@@ -147,17 +147,16 @@ def take_first_steps(stages, current, count, most_seconds=float("inf")):
         known.add(id(stage.configuration))
         with naming_stage(stage), located_instability(stage.configuration), steps():
             if stage.number:
-                before, current = current, stage_simulation(stage, first)
-                carry_over(before, current, stage, stages[0].configuration.simulation.seed)
+                current = following_simulation(current, stage, first, stages[0].configuration.simulation.seed)
             for _ in range(min(count, stage.configuration.simulation.steps)):
                 if time.process_time() - start < most_seconds:
                     current[0].step(1)
 
 
-def _cost(configuration, stages, simulation, filaments):
+def _cost(configuration, stages, simulation, built):
     settings = configuration.simulation
     with tempfile.TemporaryDirectory() as folder, located_instability(configuration), steps():
-        recorder = Recorder(stages[0], filaments, simulation, RunDirectory(folder), None, stages)
+        recorder = Recorder(stages[0], built, simulation, RunDirectory(folder), None, stages)
         step, seconds = recorder.seconds_of_run(_MEASURED_SECONDS)
     seconds *= settings.steps / stages[0].configuration.simulation.steps
     particles, reports = simulation.system.getNumParticles(), sum(own.reports for own in stages) + 1
@@ -165,7 +164,7 @@ def _cost(configuration, stages, simulation, filaments):
     trajectory = 276 + reports * (3 * (4 * particles + 8) + (56 if configuration.box is not None else 0))
     tables = reports * _BYTES_OF_NUMBER * len(ENERGY_COLUMNS)
     tables += reports * _BYTES_OF_NUMBER * len(LINKER_TABLE_COLUMNS) * len(configuration.linkers)
-    grow = sum(filament.growth is not None for filament in filaments)
+    grow = sum(filament.growth is not None for filament in built.filaments)
     tables += reports * _BYTES_OF_NUMBER // 2 * len(GROWTH_TABLE_COLUMNS) * grow
     return [
         f"  about {_duration(seconds)} for steps and reports: {1e3 * step:.3g} ms a step at first",

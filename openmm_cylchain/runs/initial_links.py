@@ -60,9 +60,14 @@ def _table(configuration, groups, held, filaments, seed):
     )
     rests, stiffness, extensions = map(np.concatenate, columns)
     numbers = np.arange(len(pairs))
-    return CrosslinkTable(
-        numbers, pairs, stiffness, rests, extensions, len(pairs), partners, fractions, points, np.ones(len(pairs), bool)
-    )
+    active = _are_there(filaments, pairs)
+    return CrosslinkTable(numbers, pairs, stiffness, rests, extensions, len(pairs), partners, fractions, points, active)
+
+
+def _are_there(filaments, pairs):
+    # Which links are on no filament that is not there.
+    absent = [nodes for own, nodes in zip(filaments, filaments.node_indices) if not own.takes_part]
+    return ~np.isin(pairs, np.concatenate(absent)).any(axis=1) if absent else np.ones(len(pairs), bool)
 
 
 def _refuse_torn(own, distances, rests):

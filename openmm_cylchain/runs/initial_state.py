@@ -36,7 +36,7 @@ _POINTS_OF_ELEMENT = 8
 
 @dataclass(frozen=True)
 class BuiltSystem:
-    """Filaments in a System with all forces, and what their integrator needs."""
+    """Filaments in a System with all forces, and what their integrator needs; ``deleted`` are those that have gone."""
 
     filaments: Filaments
     topology: app.Topology
@@ -45,6 +45,7 @@ class BuiltSystem:
     particle_friction: np.ndarray | None
     flow: object
     links: int
+    deleted: frozenset = frozenset()
 
     def arguments(self):
         """Keyword arguments of ``create_integrator``, ``recommended_time_step`` and ``check_time_step``."""
@@ -52,7 +53,7 @@ class BuiltSystem:
 
 
 @located_errors
-def build_system(configuration, engine, seed, kinetics=True, begun=None):
+def build_system(configuration, engine, seed, kinetics=True, begun=None, deleted=frozenset()):
     """The System of a configuration.
 
     Parameters
@@ -64,12 +65,14 @@ def build_system(configuration, engine, seed, kinetics=True, begun=None):
         Whether to have linkers, and monomers that come and go.
     begun : Filaments, optional
         Whose initial positions are taken, in the place of drawn ones.
+    deleted : frozenset of int
+        Numbers of filaments that have gone.
 
     Returns
     -------
     BuiltSystem
     """
-    filaments = place_filaments(configuration, engine, seed, kinetics, begun)
+    filaments = place_filaments(configuration, engine, seed, kinetics, begun, deleted)
     topology, system, positions = filaments.build(box_vectors(configuration.box))
     positions, spheres, radii, friction = _add_particles(configuration, seed, topology, system, positions)
     present = filaments if all(own.takes_part for own in filaments) else FilamentsThatTakePart(filaments)
@@ -103,7 +106,7 @@ def build_system(configuration, engine, seed, kinetics=True, begun=None):
     for own, entries in zip(configuration.pulls, tables["pull"]):
         with entries.naming():
             system.addForce(_pull(own, filaments))
-    return BuiltSystem(filaments, topology, system, positions, friction, configuration.flow, count)
+    return BuiltSystem(filaments, topology, system, positions, friction, configuration.flow, count, deleted)
 
 
 def stands_alone(configuration):
@@ -142,7 +145,7 @@ def recommended_step(configuration, scheme, engine, seed, built=None):
     return built.filaments.recommended_time_step(scheme, system=built.system, **built.arguments())
 
 
-def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
+def place_filaments(configuration, engine, seed, kinetics=True, begun=None, deleted=frozenset()):
     """Filaments with their initial positions, tethers and linkers.
 
     Filaments without a position are laid out side by side on a grid in the xy plane, centred on the origin, for the eye
@@ -155,6 +158,8 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
     engine : {"compiled", "portable"} or None
     begun : Filaments, optional
         Whose positions are taken.
+    deleted : frozenset of int
+        Numbers of filaments that have gone; of those that grow, the state of a Context says so.
 
     Returns
     -------
@@ -191,8 +196,8 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None):
             if planar is not None and group.planar:
                 planar.add(number, nodes, group.closed)
             _add(filaments, group, nodes, control_points, kinetics)
-        if not group.active:
-            for number in range(first, len(filaments)):
+        for number in range(first, len(filaments)):
+            if not group.active or (number in deleted and group.growth is None):
                 filaments.set_aside(number)
     messages.finish()
     if configuration.contacts is not None:

@@ -162,8 +162,7 @@ def _joined(run, frame):
 
 
 def _count(run, frame):
-    # Without places of filaments that are not there.
-    return len(run.filaments) - (int(np.sum(run.growth["nodes"][frame] == 0)) if run.growth else 0)
+    return sum(1 for own in run.nodes(frame) if len(own))
 
 
 def _radius(run, frame):
@@ -182,7 +181,11 @@ def _of_gliding(configuration, run):
     first = len(run) // 2
     if not members or len(run) - first < 3:
         return
-    nodes = [[own[number] for number in members] for own in map(run.nodes, range(first, len(run)))]
+    nodes = [run.nodes(frame) for frame in range(first, len(run))]
+    members = [number for number in members if all(len(own[number]) for own in nodes)]
+    if not members:
+        return
+    nodes = [[own[number] for number in members] for own in nodes]
     ends = np.array([[(own[0], own[-1]) for own in frame] for frame in nodes])
     centers = np.array([[0.5 * (own[1:] + own[:-1]).mean(axis=0) for own in frame] for frame in nodes])
     axes = ends[:, :, 1] - ends[:, :, 0]

@@ -80,21 +80,21 @@ def _bind_linkers(configuration, built, positions):
     place_linkers(find_binding_force(built.system), linkers, moved, filaments.temperature, positions, box)
 
 
-def relaxed_again(configuration, begun, positions):
+def relaxed_again(configuration, begun, positions, deleted):
     """Positions in the midst of a run, as a quantity, where filaments that have come may overlap with others.
 
-    ``begun`` are Filaments whose initial places are those of the run.
+    ``begun`` are Filaments whose initial places are those of the run, ``deleted`` the numbers of those that have gone.
     """
     messages = ProgressMessages()
     try:
-        return _come_apart(configuration, positions, _progress(messages), begun)
+        return _come_apart(configuration, positions, _progress(messages), begun, deleted)
     finally:
         messages.finish()
 
 
-def _come_apart(configuration, positions, progress, begun=None):
+def _come_apart(configuration, positions, progress, begun=None, deleted=frozenset()):
     settings, temperature = configuration.simulation, configuration.solvent.temperature
-    alone = build_system(configuration, settings.engine, settings.seed, kinetics=False, begun=begun)
+    alone = build_system(configuration, settings.engine, settings.seed, kinetics=False, begun=begun, deleted=deleted)
     recommended = alone.filaments.recommended_time_step(settings.scheme, system=alone.system, **alone.arguments())
     longest = min(settings.time_step, recommended.step)
     integrator = alone.filaments.create_integrator(

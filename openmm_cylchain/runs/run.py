@@ -38,7 +38,7 @@ from .relaxation import relaxed_positions
 from .rows_of_forces import RowsOfForces
 from .run_directory import Checkpoint, RunDirectory
 from .signals import Signals
-from .stage_transition import carry_over
+from .stage_transition import following_simulation
 from .stages import naming_stage, stage_at, stages_of
 
 _SECONDS_BETWEEN_CHECKS = 0.2
@@ -101,7 +101,7 @@ def run(configuration, output, resume=False):
             _write_crosslinks(directory, simulation, stages)
         else:
             stage = stage_at(stages, checkpoint.step)
-            current = first if stage.number == 0 else stage_simulation(stage, first)
+            current = first if stage.number == 0 else stage_simulation(stage, first, checkpoint.deleted)
             _restore(current[0].context, checkpoint, current[1].filaments.engine)
             _check_crosslinks(directory, current[0], stages, checkpoint.step)
             where = f" in {stage.name}" if stage.name else ""
@@ -126,16 +126,13 @@ def _run_stages(stages, stage, first, current, directory, checkpoint, signals, p
     seed = stages[0].configuration.simulation.seed
     while True:
         with naming_stage(stage), located_instability(stage.configuration), steps():
-            checkpoint = Recorder(stage, current[1].filaments, current[0], directory, checkpoint, stages).run_to_end(
-                signals, progress
-            )
+            recorder = Recorder(stage, current[1], current[0], directory, checkpoint, stages)
+            checkpoint = recorder.run_to_end(signals, progress)
         if stage.number == len(stages) - 1:
             return
         stage = stages[stage.number + 1]
-        after = stage_simulation(stage, first)
         with naming_stage(stage):
-            carry_over(current, after, stage, seed)
-        current = after
+            current = following_simulation(current, stage, first, seed)
         _write_crosslinks(directory, current[0], stages, stage.first_step)
 
 
@@ -246,12 +243,12 @@ def _restore(context, checkpoint, engine):
 class Recorder:
     # Advances the simulation and writes frames, energies, linkers and checkpoints at their times.
 
-    def __init__(self, stage, filaments, simulation, directory, checkpoint, stages=None):
-        configuration = stage.configuration
+    def __init__(self, stage, built, simulation, directory, checkpoint, stages=None):
+        configuration, filaments = stage.configuration, built.filaments
         self._stage, self._stages = stage, stages or (stage,)
         self._settings = configuration.simulation
         self._kT = thermal_energy(configuration.solvent.temperature)
-        self._filaments = filaments
+        self._filaments, self._deleted = filaments, built.deleted
         self._simulation = simulation
         self._directory = directory
         self._checkpoint = checkpoint
@@ -379,7 +376,7 @@ class Recorder:
         growth = growth_in(context, self._filaments)
         stretching, bending = energies_of_growing(context) if growth else total_energies(self._filaments, positions)
         self._check_finite(positions, stretching, bending)
-        self._trajectory.write(positions)
+        self._trajectory.write(self._without_absent(positions))
         self._energies.write(
             self._step,
             (
@@ -399,6 +396,16 @@ class Recorder:
             self._growth.write(self._step, (self._stage.time(self._step), *row))
         for row in self._moving.rows(self._step, positions):
             self._pulling.write(self._step, row)
+
+    def _without_absent(self, positions):
+        # Of a filament that is not there, all particles are in one place: that of a node that stands still.
+        absent = [number for number, own in enumerate(self._filaments) if not own.takes_part]
+        if absent:
+            positions = np.array(positions)
+        for number in absent:
+            nodes = self._filaments.node_indices[number]
+            positions[nodes] = positions[self._filaments.control_point_indices[number]] = positions[nodes[-1]]
+        return positions
 
     def _check_finite(self, positions, stretching, bending):
         if np.isfinite(stretching) and np.isfinite(bending) and np.all(np.isfinite(positions)):
@@ -446,6 +453,7 @@ class Recorder:
             pulling_size=self._pulling.synchronise() if self._moving else 0,
             force_sizes=self._forces.synchronise(),
             growth_size=self._growth.synchronise() if self._grows else 0,
+            deleted=self._deleted,
             state=self._simulation.context.createCheckpoint(),
         )
         self._directory.write_checkpoint(checkpoint)

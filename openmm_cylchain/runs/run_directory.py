@@ -15,12 +15,12 @@ from ..version import __version__
 from .configuration import changed_keys, read_configuration
 from .start_files import COPIES
 
-_MAGIC = "openmm-cylchain checkpoint 5"
+_MAGIC = "openmm-cylchain checkpoint 6"
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """State of a run after ``step`` steps: OpenMM's checkpoint and the extent of the files at that moment."""
+    """State of a run after ``step`` steps: OpenMM's checkpoint, the extent of files, and which filaments have gone."""
 
     step: int
     engine: str
@@ -33,6 +33,7 @@ class Checkpoint:
     pulling_size: int = 0
     force_sizes: tuple[int, int] = (0, 0)
     growth_size: int = 0
+    deleted: frozenset[int] = frozenset()
 
 
 class RunDirectory(RunFiles):
@@ -148,6 +149,7 @@ class RunDirectory(RunFiles):
             "pulling_size": checkpoint.pulling_size,
             "force_sizes": checkpoint.force_sizes,
             "growth_size": checkpoint.growth_size,
+            "deleted": sorted(checkpoint.deleted),
             "state_size": len(checkpoint.state),
         }
         header["digest"] = digest_of_checkpoint(header, checkpoint.state)
@@ -179,6 +181,7 @@ class RunDirectory(RunFiles):
                 pulling_size=header["pulling_size"],
                 force_sizes=tuple(header["force_sizes"]),
                 growth_size=header["growth_size"],
+                deleted=frozenset(header["deleted"]),
                 state=state,
             )
         except InputError:

@@ -1,6 +1,7 @@
 """From a stage of a run to the next one: another System, in the state in which the last one has ended.
 
-Linkers that a stage adds are not bound, unless it says so; of those that it takes away, each has the same chance.
+Linkers that a stage adds are not bound, unless it says so; of those that it takes away, each has the same chance. Hands
+on filaments that it deletes let go.
 """
 
 import functools
@@ -8,42 +9,79 @@ import functools
 import numpy as np
 
 from ..systems.carried_state import carry_state
+from .created_simulation import stage_simulation
+from .deleted_filaments import deleted_filaments
 from .relaxation import relaxed_again
 from .tables.linkers import KEPT
 
 
-def carry_over(before, after, stage, seed):
-    """Bring the Context of a stage into the state of that of the stage before; see ``carry_state``.
+def following_simulation(before, stage, first, seed):
+    """The Simulation of a stage, in the state in which that before has ended, and its BuiltSystem.
 
     Parameters
     ----------
-    before, after : tuple of (app.Simulation, BuiltSystem)
+    before, first : tuple of (app.Simulation, BuiltSystem)
+        Of the stage before, and of the first one.
     stage : Stage
         The later one.
     seed : int
-        By which linkers are chosen that are taken away.
+        By which linkers and filaments are chosen that are taken away.
 
     Raises
     ------
     InputError
-        If the two Systems have not the same particles.
+        If it cannot be simulated, or the two Systems have not the same particles.
     """
-    (old, old_built), (new, built) = before, after
+    old, old_built = before
+    going = deleted_filaments(stage, before, seed)
+    new, built = stage_simulation(stage, first, old_built.deleted | going)
     generator = np.random.default_rng([seed, stage.number, 6])
-    carry_state(old.context, new.context, functools.partial(_change_linkers, stage, generator))
+    carry_state(
+        old.context,
+        new.context,
+        functools.partial(_change_linkers, stage, generator, going),
+        functools.partial(_delete_grown, going),
+    )
+    if any(built.filaments[number].growth is not None for number in going):
+        positions = new.context.getState(positions=True).getPositions(asNumpy=True)
+        for number in going:
+            nodes = built.filaments.node_indices[number]
+            if built.filaments[number].growth is not None:
+                positions[nodes] = positions[nodes[0]]
+        new.context.setPositions(positions)
     pairs = list(zip(old_built.filaments, built.filaments))
     have_come = any(own.takes_part and not other.takes_part for other, own in pairs)
     if have_come and stage.configuration.relaxes and all(own.growth is None for own in built.filaments):
         positions = new.context.getState(positions=True).getPositions(asNumpy=True)
-        new.context.setPositions(relaxed_again(stage.configuration, built.filaments, positions))
+        new.context.setPositions(relaxed_again(stage.configuration, built.filaments, positions, built.deleted))
+    return new, built
 
 
-def _change_linkers(stage, generator, columns, force):
+def _delete_grown(deleted, columns, force):
+    # Their monomers are no longer anywhere: a pool that has a volume does not get them.
+    chains = [force.getGrowingChainParameters(index)[0] for index in range(force.getNumGrowingChains())]
+    gone = np.isin(chains, list(deleted))
+    if not gone.any():
+        return
+    ends = columns.get("ends").reshape(-1, 2)
+    states = [force.getMonomersHaveStates(index) for index in range(len(chains))]
+    stays = np.repeat(~gone, np.where(states, ends[:, 1] - ends[:, 0], 0))
+    ends[gone] = 0
+    columns.put("ends", ends)
+    for name in ("monomerTimes", "monomerStates"):
+        columns.put(name, columns.get(name)[stays])
+    for name in ("identities", "parents"):
+        columns.put(name, np.where(gone, -1, columns.get(name)))
+
+
+def _change_linkers(stage, generator, deleted, columns, force):
     first = force.getLinkers()
     rows = {name: columns.get(name) for name in ("numbers", "types", "anchors", "clocks")}
     rows["chains"], rows["places"] = (columns.get(name).reshape(-1, 2) for name in ("chains", "places"))
-    _let_go(rows, force)
-    keep, added = np.ones(len(rows["numbers"]), bool), []
+    _let_go(rows, force, deleted)
+    # Behind those of the file are those by which mothers hold branches, which are no more when one of the two is not.
+    of_branches = (rows["types"] >= len(stage.configuration.linkers)) & (rows["anchors"] < 0)
+    keep, added = ~(of_branches & (rows["chains"] < 0).any(axis=1)), []
     for number, own in enumerate(stage.configuration.linkers):
         if own.anchors is not None:
             continue
@@ -76,8 +114,11 @@ def _change_linkers(stage, generator, columns, force):
         columns.put("unboundPlaces", places[stay])
 
 
-def _let_go(rows, force):
-    # Hands of which a stage says that they do not bind there.
+def _let_go(rows, force, deleted):
+    # Hands on filaments that go, and those of which a stage says that they do not bind there.
+    gone = np.isin(rows["chains"], list(deleted))
+    rows["chains"][gone] = -1
+    rows["places"][gone] = 0.0
     for number in range(force.getNumLinkerTypes()):
         for side, hand in enumerate(force.getLinkerTypeParameters(number)[:2]):
             if hand < 0:

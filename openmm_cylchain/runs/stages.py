@@ -14,13 +14,14 @@ import numpy as np
 from ..errors import InputError, InstabilityError
 from ..units.quantities import TIME
 from ..units.text import format_time
+from .deleted_filaments import refuse_held
 from .keys import ConfigurationError, Place, Quantity
 from .stage_changes import apply_stage, in_unit_of
 from .table import UnknownKeyError
 from .tables.stages import STAGE
 
 _MOST_STAGES = 10**5
-_AT_THE_BEGINNING = ("bound", "bound_at", "keep")
+_AT_THE_BEGINNING = {"linkers": ("bound", "bound_at", "keep"), "filament": ("delete",)}
 _DURATION = ("simulation", "duration")
 
 
@@ -184,15 +185,21 @@ def read_stages(raw, kinds, read):
     if isinstance(simulation, dict) and _DURATION[1] in simulation:
         text = "[simulation] duration is said by [[stage]] tables: leave it out, or give it as that of a first stage."
         raise ConfigurationError(text, _DURATION)
-    stages, reset, known = [], [], {}
+    stages, reset, known, thinned = [], [], {}, set()
     for leaf in _leaves(raw[STAGE.name], ("stage",), "", itertools.count(1)):
         changes = apply_stage(_as_they_are(tables) if stages else tables, leaf.table, leaf.place, kinds)
+        for path, origin in changes.origins.items():
+            if path[0] == "filament" and path[2:] == ("delete",):
+                if not stages:
+                    raise origin.error("belongs to a later stage: in the first one, all begin that the file has.")
+                thinned.add(path[1] + 1)
         pieces = _pieces(leaf, changes)
         for piece in range(pieces):
             own = changes.resolved((piece + 0.5) / pieces)
             configuration = _read_piece(own, leaf, pieces, changes, read, known)
             if stages:
                 _refuse_other_structure(stages[0].configuration, configuration, leaf)
+                refuse_held(configuration, thinned, leaf.place)
             stages.append(_next_stage(stages, leaf, configuration, piece, changes))
             moved = {path[1] for path in changes.origins if path[0] == "tether" and path[2] == "point"}
             reset.append(frozenset(moved) if piece == 0 else frozenset())
@@ -239,12 +246,13 @@ def _pieces(leaf, changes):
 
 
 def _as_they_are(tables):
-    # What holds for the beginning of a stage alone, of linkers, is said by that stage.
-    linkers = tables.get("linkers")
-    if not isinstance(linkers, list) or not all(isinstance(own, dict) for own in linkers):
-        return tables
-    kept = [{key: own[key] for key in own if key not in _AT_THE_BEGINNING} for own in linkers]
-    return {**tables, "linkers": kept}
+    # What holds for the beginning of a stage alone is said by that stage.
+    kept = {}
+    for name, keys in _AT_THE_BEGINNING.items():
+        there = tables.get(name)
+        if isinstance(there, list) and all(isinstance(own, dict) for own in there):
+            kept[name] = [{key: own[key] for key in own if key not in keys} for own in there]
+    return {**tables, **kept}
 
 
 def _read_piece(tables, leaf, pieces, changes, read, known):

@@ -138,15 +138,27 @@ def summarise(configuration, trajectory):
     """Observables of a run against theory: a GroupSummary for each [[filament]] table; see ``load_trajectory``."""
     labels = group_labels(configuration)
     return [
-        _summarise_group(configuration, group, list(members), label, trajectory)
+        _summarise_group(
+            configuration, group, members_in_all_frames(configuration, members, trajectory), label, trajectory
+        )
         for group, members, label in zip(configuration.filaments, group_members(configuration), labels)
     ]
+
+
+def members_in_all_frames(configuration, members, trajectory):
+    """Those of some filaments that are there in all stages of a run, but for those that grow: a list of numbers."""
+    if len(configuration.stages) < 2:
+        return list(members)
+    nodes = node_positions(trajectory, list(members)) if len(members) else []
+    return [number for number, own in zip(members, nodes) if np.all(np.isfinite(own))]
 
 
 def _summarise_group(configuration, group, members, label, trajectory):
     observables, short = [], []
     if group.growth is not None:
-        return _growing_group(group, label)
+        return _without_averages(group, label, _GROW)
+    if not members:
+        return _without_averages(group, label, _PASS)
     rounding = _rounding_share(configuration, group, trajectory)
     comparable = is_in_equilibrium(group) and rounding <= _ROUNDING_OF_ALL
     temperature = configuration.solvent.temperature
@@ -166,7 +178,7 @@ def _summarise_group(configuration, group, members, label, trajectory):
     return GroupSummary(
         label=label,
         type=group.type.name,
-        filaments=group.count,
+        filaments=len(members),
         segments=group.segments,
         start=group.start,
         in_equilibrium=is_in_equilibrium(group),
@@ -175,9 +187,11 @@ def _summarise_group(configuration, group, members, label, trajectory):
     )
 
 
-def _growing_group(group, label):
-    # Their segments are not alike, and they have more or less of them in each frame.
-    note = "They grow: see growth.csv for their lengths, and energies.csv for energies per segment and joint."
+_GROW = "They grow: see growth.csv for their lengths, and energies.csv for energies per segment and joint."
+_PASS = "None of them is there all the time: there are no averages."
+
+
+def _without_averages(group, label, note):
     own = label, group.type.name, group.count, group.segments, group.start
     return GroupSummary(*own, in_equilibrium=False, observables=(), notes=(note,))
 
@@ -371,9 +385,9 @@ def _notes(configuration, group, members, trajectory, short, rounding):
         yield "Started from a file: whether that is equilibrium is not known, so nothing is compared with it."
     if group.start == "nodes":
         yield "Started from given nodes: whether that is equilibrium is not known, so nothing is compared with it."
-    if group.count >= _ENOUGH_FILAMENTS:
+    if len(members) >= _ENOUGH_FILAMENTS:
         yield (
-            f"Errors: standard error of the time averages of {group.count} independent filaments, which holds "
+            f"Errors: standard error of the time averages of {len(members)} independent filaments, which holds "
             "however slowly a filament relaxes (persistence length: from its correlation in time)."
         )
     else:

@@ -33,6 +33,7 @@ from .summary import (
     group_members,
     has_exact_extension,
     is_in_equilibrium,
+    members_in_all_frames,
 )
 
 _COLOURS = (*FILAMENT_COLORS, "#CC79A7", "#000000")
@@ -73,7 +74,12 @@ def _draw(configuration, directory, trajectory, network):
             colors_of_filaments(len(configuration.filaments)),
         )
     ]
-    still = [entry for entry, grows in zip(groups, grow) if not grows]
+    still = [
+        (group, members_in_all_frames(configuration, members, trajectory), *others)
+        for (group, members, *others), grows in zip(groups, grow)
+        if not grows
+    ]
+    still = [entry for entry in still if entry[1]]
     temperature = configuration.solvent.temperature
     energies = read_table(directory.energies)
     labels = linker_labels(configuration)

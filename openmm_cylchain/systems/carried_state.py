@@ -40,6 +40,7 @@ def carry_state(
     before: openmm.Context,
     after: openmm.Context,
     change_linkers: Callable[[StateColumns, Any], None] | None = None,
+    change_growth: Callable[[StateColumns, Any], None] | None = None,
 ) -> None:
     """Bring a Context into the state of another one.
 
@@ -48,8 +49,8 @@ def carry_state(
 
     Parameters
     ----------
-    change_linkers : callable, optional
-        Given the StateColumns of linkers and the force of the later System, changes them.
+    change_linkers, change_growth : callable, optional
+        Given the StateColumns of linkers, or of growth, and the force of the later System, changes them.
 
     Raises
     ------
@@ -78,7 +79,10 @@ def carry_state(
     if linkers is not None and change_linkers is not None:
         change_linkers(StateColumns(linkers), find_binding_force(after.getSystem()))
     if growth is not None:
-        _change_pools(StateColumns(growth), *(find_growth_force(own.getSystem()) for own in (before, after)))
+        columns, forces = StateColumns(growth), [find_growth_force(own.getSystem()) for own in (before, after)]
+        _change_pools(columns, *forces)
+        if change_growth is not None and forces[1] is not None:
+            change_growth(columns, forces[1])
     try:
         after.setState(openmm.XmlSerializer.deserialize(ElementTree.tostring(tree, encoding="unicode")))
     except openmm.OpenMMException as error:

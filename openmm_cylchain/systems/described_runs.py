@@ -192,9 +192,11 @@ def _particle_masses(filaments, system):
 
 
 def total_energies(filaments: Any, positions: FloatArray) -> tuple[float, float]:
-    """Stretching and bending energy of all filaments in kJ/mol, for positions in nm."""
+    """Stretching and bending energy of all filaments that are there in kJ/mol, for positions in nm."""
     stretching = bending = 0.0
     for filament, nodes, controls in zip(filaments, filaments.node_indices, filaments.control_point_indices):
+        if not filament.takes_part:
+            continue
         with np.errstate(all="ignore"):
             energies = filament.energies(positions[nodes], positions[controls], filaments.temperature)
         stretching += energies[0]
@@ -229,9 +231,9 @@ def energy_cells(
 
     Positions are in nm, energies those of ``total_energies``, and ``growth`` that of filaments that grow.
     """
-    segments = sum(filament.segments for filament in filaments)
-    bends = sum(filament.bends for filament in filaments)
-    there = np.ones(len(filaments), dtype=bool)
+    segments = sum(filament.segments for filament in filaments if filament.takes_part)
+    bends = sum(filament.bends for filament in filaments if filament.takes_part)
+    there = np.array([filament.takes_part for filament in filaments], dtype=bool)
     if growth is not None:
         grown = [filaments[number] for number in growth.filaments]
         segments += int(np.maximum(growth.nodes - 1, 0).sum()) - sum(own.segments for own in grown)

@@ -10,10 +10,49 @@ using namespace std;
 /** The least distance from the middle of a shape, and the differences by which curvatures are found, over its size. */
 static const double LEAST_DISTANCE = 1e-6, OF_DIFFERENCES = 1e-4;
 
+/** A direction at right angles to a vector. */
+static void findOrthogonal(const double* vector, double* result) {
+    const double size = sqrt(dot(vector, vector));
+    const double direction[] = {vector[0]/size, vector[1]/size, vector[2]/size};
+    int least = 0;
+    for (int k = 1; k < 3; k++)
+        if (fabs(direction[k]) < fabs(direction[least]))
+            least = k;
+    double square = 0;
+    for (int k = 0; k < 3; k++) {
+        result[k] = (k == least ? 1 : 0)-direction[least]*direction[k];
+        square += result[k]*result[k];
+    }
+    for (int k = 0; k < 3; k++)
+        result[k] /= sqrt(square);
+}
+
+/** Find the way from the axis of a torus, and its length, for a vector from the center; some way on the axis. */
+static double findWayFromAxis(const Wall& wall, const double* r, double* outward) {
+    const double* v = wall.vector;
+    const double along = dot(v, r)/dot(v, v);
+    double way[3];
+    for (int k = 0; k < 3; k++)
+        way[k] = r[k]-along*v[k];
+    const double distance = sqrt(dot(way, way));
+    findOrthogonal(v, outward);
+    for (int k = 0; k < 3 && distance > 0; k++)
+        outward[k] = way[k]/distance;
+    return distance;
+}
+
 /** Take a vector that begins at the point of a wall to where the middle of its round face is nearest. */
 static void beginInMiddle(const Wall& wall, double* r) {
     const double* v = wall.vector;
     double along = 0;
+    if (wall.shape == WallShape::Torus) {
+        double outward[3];
+        findWayFromAxis(wall, r, outward);
+        const double radius = sqrt(dot(v, v));
+        for (int k = 0; k < 3; k++)
+            r[k] -= radius*outward[k];
+        return;
+    }
     if (wall.shape == WallShape::Cylinder)
         along = dot(v, r);
     else if (wall.shape == WallShape::Capsule)
@@ -40,6 +79,7 @@ static bool isInShape(const Wall& wall, const double* position) {
             return dot(r, r)-along*along <= wall.length*wall.length;
         }
         case WallShape::Capsule:
+        case WallShape::Torus:
             beginInMiddle(wall, r);
             return dot(r, r) <= wall.length*wall.length;
         case WallShape::Box:
@@ -69,8 +109,11 @@ static bool findBoundsOf(const Wall& wall, double* lower, double* upper) {
     if (wall.side != WallSide::Inside || wall.shape == WallShape::Plane || wall.shape == WallShape::Slab ||
             wall.shape == WallShape::Cylinder)
         return false;
+    const double* v = wall.vector;
     for (int k = 0; k < 3; k++) {
-        const double ofVector = wall.shape == WallShape::Sphere ? 0 : fabs(wall.vector[k]);
+        double ofVector = wall.shape == WallShape::Sphere ? 0 : fabs(v[k]);
+        if (wall.shape == WallShape::Torus)
+            ofVector = sqrt(max(0.0, dot(v, v)-v[k]*v[k]));
         const double half = ofVector+(wall.shape == WallShape::Ellipsoid ? 0 : wall.length);
         lower[k] = wall.shape == WallShape::Box ? wall.point[k] : wall.point[k]-half;
         upper[k] = wall.shape == WallShape::Box ? wall.vector[k] : wall.point[k]+half;
@@ -130,7 +173,8 @@ bool cylchain::isFlat(const Wall& wall) {
 }
 
 bool cylchain::isRound(const Wall& wall) {
-    return wall.shape == WallShape::Sphere || wall.shape == WallShape::Cylinder || wall.shape == WallShape::Capsule;
+    return wall.shape == WallShape::Sphere || wall.shape == WallShape::Cylinder || wall.shape == WallShape::Capsule ||
+            wall.shape == WallShape::Torus;
 }
 
 double cylchain::getRoom(const Wall& wall) {
@@ -143,6 +187,7 @@ double cylchain::getRoom(const Wall& wall) {
         case WallShape::Sphere:
         case WallShape::Cylinder:
         case WallShape::Capsule:
+        case WallShape::Torus:
             return wall.length;
         case WallShape::Box:
             return 0.5*min(min(v[0]-p[0], v[1]-p[1]), v[2]-p[2]);
@@ -150,23 +195,6 @@ double cylchain::getRoom(const Wall& wall) {
             return min(min(v[0], v[1]), v[2]);
     }
     return 0;
-}
-
-/** A direction at right angles to a vector. */
-static void findOrthogonal(const double* vector, double* result) {
-    const double size = sqrt(dot(vector, vector));
-    const double direction[] = {vector[0]/size, vector[1]/size, vector[2]/size};
-    int least = 0;
-    for (int k = 1; k < 3; k++)
-        if (fabs(direction[k]) < fabs(direction[least]))
-            least = k;
-    double square = 0;
-    for (int k = 0; k < 3; k++) {
-        result[k] = (k == least ? 1 : 0)-direction[least]*direction[k];
-        square += result[k]*result[k];
-    }
-    for (int k = 0; k < 3; k++)
-        result[k] /= sqrt(square);
 }
 
 /** The depth (s-1) s/q with q^2 the sum of x_i^2/a_i^4. */
@@ -212,11 +240,14 @@ static double findDepthBeyond(const Wall& wall, int face, const double* position
         }
         case WallShape::Sphere:
         case WallShape::Cylinder:
-        case WallShape::Capsule: {
-            const bool hasAxis = wall.shape != WallShape::Sphere;
+        case WallShape::Capsule:
+        case WallShape::Torus: {
+            const bool hasAxis = wall.shape == WallShape::Cylinder || wall.shape == WallShape::Capsule;
             beginInMiddle(wall, r);
-            const double distance = sqrt(dot(r, r));
-            const double up[] = {0, 0, 1};
+            const double distance = sqrt(dot(r, r)), size = sqrt(dot(v, v));
+            double up[] = {0, 0, 1};
+            for (int k = 0; k < 3 && wall.shape == WallShape::Torus; k++)
+                up[k] = v[k]/size;
             if (!(distance > 1e-12*wall.length) && hasAxis)
                 findOrthogonal(v, gradient);
             else
@@ -246,17 +277,42 @@ double cylchain::findDepth(const Wall& wall, int face, const double* position, d
     return radius-depth;
 }
 
-void cylchain::addTurning(const Wall& wall, const double* g, double size, double* turning) {
-    const double* axis = wall.vector;
+void cylchain::addTurning(const Wall& wall, const double* position, const double* g, double size, double* turning) {
+    double axis[] = {wall.vector[0], wall.vector[1], wall.vector[2]};
+    bool hasAxis = wall.shape == WallShape::Cylinder || wall.shape == WallShape::Torus;
+    if (wall.shape == WallShape::Torus) {
+        // Around the tube, as of a cylinder: what the circle bends is less.
+        double r[3], outward[3];
+        for (int k = 0; k < 3; k++)
+            r[k] = position[k]-wall.point[k];
+        findWayFromAxis(wall, r, outward);
+        for (int k = 0; k < 3; k++)
+            axis[k] = wall.vector[(k+1)%3]*outward[(k+2)%3]-wall.vector[(k+2)%3]*outward[(k+1)%3];
+    }
     const double square = dot(axis, axis);
     // The caps of a capsule are those of a sphere: there, the gradient has a part along the axis.
-    const bool hasAxis = wall.shape == WallShape::Cylinder ||
-            (wall.shape == WallShape::Capsule && fabs(dot(axis, g)) < 1e-9*sqrt(square));
+    if (wall.shape == WallShape::Capsule)
+        hasAxis = fabs(dot(axis, g)) < 1e-9*sqrt(square);
     const double along = hasAxis ? 1/square : 0;
     int entry = 0;
     for (int i = 0; i < 3; i++)
         for (int k = i; k < 3; k++)
             turning[entry++] += size*((i == k ? 1 : 0)-g[i]*g[k]-along*axis[i]*axis[k]);
+}
+
+/** Add the curvature of a torus along its circle. */
+static void addBendOfCircle(const Wall& wall, const double* position, const double* g, double* curvature) {
+    double r[3], outward[3], aside[3];
+    for (int k = 0; k < 3; k++)
+        r[k] = position[k]-wall.point[k];
+    const double size = sqrt(dot(wall.vector, wall.vector));
+    const double distance = max(findWayFromAxis(wall, r, outward), LEAST_DISTANCE*size);
+    for (int k = 0; k < 3; k++)
+        aside[k] = (wall.vector[(k+1)%3]*outward[(k+2)%3]-wall.vector[(k+2)%3]*outward[(k+1)%3])/size;
+    int entry = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = i; k < 3; k++)
+            curvature[entry++] += dot(g, outward)/distance*aside[i]*aside[k];
 }
 
 void cylchain::findCurvature(const Wall& wall, const double* position, double* curvature) {
@@ -266,7 +322,9 @@ void cylchain::findCurvature(const Wall& wall, const double* position, double* c
     double gradient[3];
     if (isRound(wall)) {
         const double distance = findDepthBeyond(wall, 0, position, gradient)+wall.length;
-        addTurning(wall, gradient, 1/max(distance, LEAST_DISTANCE*wall.length), curvature);
+        addTurning(wall, position, gradient, 1/max(distance, LEAST_DISTANCE*wall.length), curvature);
+        if (wall.shape == WallShape::Torus)
+            addBendOfCircle(wall, position, gradient, curvature);
     }
     else {
         double rows[3][3];
@@ -298,7 +356,7 @@ void cylchain::findMeanGradient(const Wall& wall, const double* x, const double*
         const double sum = max(fromX+fromY, LEAST_DISTANCE*wall.length);
         for (int k = 0; k < 3; k++)
             gradient[k] = (fromX*ofX[k]+fromY*ofY[k])/sum;
-        if (wall.shape != WallShape::Capsule)
+        if (wall.shape == WallShape::Sphere || wall.shape == WallShape::Cylinder)
             return;
     }
     else {
@@ -324,5 +382,17 @@ bool cylchain::passesThrough(const Wall& wall, const double* x, const double* y)
     double before[3], after[3];
     findDepth(wall, 0, x, 0, before);
     findDepth(wall, 0, y, 0, after);
-    return dot(before, after) < 0;
+    if (wall.shape != WallShape::Torus)
+        return dot(before, after) < 0;
+    // Through the hole, and around all of it, there are ways to the other half of the circle, but for long ones.
+    double from[3], to[3], outward[3], other[3], square = 0;
+    for (int k = 0; k < 3; k++) {
+        from[k] = x[k]-wall.point[k];
+        to[k] = y[k]-wall.point[k];
+        square += (y[k]-x[k])*(y[k]-x[k]);
+    }
+    findWayFromAxis(wall, from, outward);
+    findWayFromAxis(wall, to, other);
+    const double hole = sqrt(dot(wall.vector, wall.vector))-wall.length;
+    return dot(outward, other) > 0 ? dot(before, after) < 0 : square > hole*hole;
 }

@@ -13,7 +13,8 @@
     ENTRY(Cylinder, "cylinder") \
     ENTRY(Box, "box") \
     ENTRY(Ellipsoid, "ellipsoid") \
-    ENTRY(Capsule, "capsule")
+    ENTRY(Capsule, "capsule") \
+    ENTRY(Torus, "torus")
 
 /** Where walls keep particles. */
 #define CYLCHAIN_WALL_SIDES(ENTRY) \
@@ -46,6 +47,8 @@ template <> struct Names<WallSide> {
  *     Box         the lower corner          the upper corner                -
  *     Ellipsoid   the center                the semi-axes                   -
  *     Capsule     the middle                from it to where a cap begins   the radius
+ *     Torus       the center                the axis, as long as the        the radius of the tube
+ *                                           radius of its circle
  *
  * Normals and axes are unit vectors. Its surface has one or more faces: each plane of a slab or box is one. With the
  * depth d of a particle's surface beyond each face, negative inside, the energy is (k/2) times the sum of d^2 over
@@ -137,12 +140,13 @@ double findDepth(const Wall& wall, int face, const double* position, double radi
 
 /**
  * Add how a force on a round face turns with the position: a size times 1-g g, without what is along a middle that is a
- * line, as a symmetric matrix.
+ * line or a circle, as a symmetric matrix.
  *
- * @param gradient     g, that of the depth
+ * @param position     three numbers
+ * @param gradient     g, that of the depth there
  * @param[out] turning  six numbers
  */
-void addTurning(const Wall& wall, const double* gradient, double size, double* turning);
+void addTurning(const Wall& wall, const double* position, const double* gradient, double size, double* turning);
 
 /** Find the second derivatives of the depth beyond a surface with one face, as a symmetric matrix. */
 void findCurvature(const Wall& wall, const double* position, double* curvature);

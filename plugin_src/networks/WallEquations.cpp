@@ -107,7 +107,8 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
                 equation.force[k] = -own*beyond*g[k];
             setOuter(own, g, equation.stiffness);
             if (searches)
-                addTurning(system->wall, g, state.force*state.curvature, equation.stiffness);
+                addTurning(system->wall, positionOf(state.particle, moved).at, g, state.force*state.curvature,
+                        equation.stiffness);
             equations.push_back(equation);
         }
 }

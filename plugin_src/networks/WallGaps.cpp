@@ -16,12 +16,12 @@ const double LEAST_WAY_TO_MIDDLE = 0.5;
 const int CHUNK_OF_WALL_GAPS = 256;
 
 /** How a unit force on a round face turns with it, if that makes steps stiffer. */
-void findTurning(const Wall& wall, const double* g, double distance, double* turning) {
+void findTurning(const Wall& wall, const double* position, const double* g, double distance, double* turning) {
     if (!isRound(wall) || wall.side == WallSide::Outside)
         return;
     // Where the middle is near, there would be more stiffness than steps can have.
     fill_n(turning, 6, 0.0);
-    addTurning(wall, g, 0.5/max(distance, LEAST_WAY_TO_MIDDLE*wall.length), turning);
+    addTurning(wall, position, g, 0.5/max(distance, LEAST_WAY_TO_MIDDLE*wall.length), turning);
 }
 
 } // namespace
@@ -66,7 +66,7 @@ void WallGaps::follow(const State& state, const double* moved, Gap& gap) const {
         middle[k] = 0.5*(from.at[k]+to.at[k]);
     gap.end = state.depth-findDepth(system->wall, state.face, to.at, radius, gradient);
     const double depth = findDepth(system->wall, state.face, middle, radius, gradient);
-    findTurning(system->wall, gradient, depth-radius+system->wall.length, gap.turning);
+    findTurning(system->wall, middle, gradient, depth-radius+system->wall.length, gap.turning);
     for (int k = 0; k < 3; k++)
         gap.levers[0].gradient[k] = -gradient[k];
 }

@@ -360,7 +360,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %}
 %pythonappend OpenMM::CylinderChainWallForce::getRegion(Vec3&, Vec3&, double&) const %{
     # Directions have no unit.
-    kind = _LENGTH if val[0] in ("box", "ellipsoid", "capsule") else unit.dimensionless
+    kind = _LENGTH if val[0] in ("box", "ellipsoid", "capsule", "torus") else unit.dimensionless
     val = [val[0], unit.Quantity(val[1], _LENGTH), unit.Quantity(val[2], kind), unit.Quantity(val[3], _LENGTH)]
 %}
 %pythonappend OpenMM::CylinderChainIntegrator::getTemperature() const %{

@@ -16,6 +16,8 @@ ACTIN = F_ACTIN.with_segment_length(20.0)
 class PlacedChains:
     """What analysis sees of a run: filaments at given nodes in each frame."""
 
+    passing = frozenset()
+
     def __init__(self, frames, box=None, rings=(), linkers=()):
         self._frames, self.linkers = frames, linkers
         self.box = None if box is None else np.diag(np.array(box, dtype=float))

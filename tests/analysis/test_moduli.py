@@ -35,6 +35,9 @@ class Dumbbells:
     def positions(self, frame):
         return np.zeros((0, 3))
 
+    def nodes(self, frame):
+        return []
+
     def crosslinks(self, frame):
         vectors = self._vectors[frame]
         places = np.stack([np.zeros_like(vectors), vectors], axis=1)

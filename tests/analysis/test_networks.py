@@ -16,6 +16,8 @@ from support.random_series import correlated_series
 class PlacedRun:
     """What analysis sees of a run: filaments at given nodes, in one frame or several."""
 
+    passing = frozenset()
+
     def __init__(self, frames, box=None, rings=()):
         self._frames = [[np.array(nodes, dtype=float) for nodes in frame] for frame in frames]
         self.box = None if box is None else np.diag(np.array(box, dtype=float))

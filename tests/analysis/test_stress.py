@@ -43,6 +43,9 @@ class PlacedRun:
     def positions(self, frame):
         return np.concatenate(self._nodes)
 
+    def nodes(self, frame):
+        return self._nodes
+
     def crosslinks(self, frame):
         places = np.reshape(np.array(self._springs, dtype=float), (-1, 2, 3))
         tensions = STIFFNESS * np.linalg.norm(places[:, 1] - places[:, 0], axis=1)

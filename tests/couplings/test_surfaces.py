@@ -12,18 +12,21 @@ from openmm_cylchain import (
     FilamentType,
     Plane,
     Sphere,
+    Torus,
     filament_wall_force,
 )
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 CENTER, AXIS = np.array([40.0, -30.0, 20.0]), np.array([1.0, 2.0, -2.0]) / 3.0
+CIRCLE = 250.0
 RADIUS, LENGTH, AXES = 100.0, 150.0, np.array([80.0, 90.0, 100.0])
 SHAPES = {
     "plane": Plane(CENTER, AXIS),
     "sphere": Sphere(CENTER, RADIUS),
     "cylinder": Cylinder(CENTER, AXIS, RADIUS),
     "capsule": Capsule(CENTER, AXIS, LENGTH, RADIUS),
+    "torus": Torus(CENTER, AXIS, CIRCLE, RADIUS),
     "ellipsoid": Ellipsoid(CENTER, AXES),
 }
 
@@ -37,6 +40,8 @@ def _depths(name, points):
     if name == "ellipsoid":
         s = np.sqrt(np.sum((apart / AXES) ** 2, axis=-1))
         return (s - 1.0) * s / np.sqrt(np.sum((apart / AXES**2) ** 2, axis=-1))
+    if name == "torus":
+        return np.hypot(np.linalg.norm(apart - along[..., None] * AXIS, axis=-1) - CIRCLE, along) - RADIUS
     half = {"sphere": 0.0, "cylinder": np.inf, "capsule": 0.5 * LENGTH}[name]
     return np.linalg.norm(apart - np.clip(along, -half, half)[..., None] * AXIS, axis=-1) - RADIUS
 
@@ -57,6 +62,12 @@ def _draw(name, stiffness, count, generator):
         heights = np.where(caps, 0.5 * LENGTH * np.sign(ends @ AXIS)[:, None], heights)
         weights = np.where(caps, 4.0 * RADIUS**2 * scale**2, 2.0 * RADIUS * LENGTH * scale)
         return CENTER + heights * AXIS + RADIUS * scale * np.where(caps, ends, side), weights[:, 0]
+    if name == "torus":
+        angle = generator.uniform(0.0, 2.0 * np.pi, (count, 1))
+        side = directions - (directions @ AXIS)[:, None] * AXIS
+        side /= np.linalg.norm(side, axis=1)[:, None]
+        away = CIRCLE + RADIUS * scale * np.cos(angle)
+        return CENTER + away * side + RADIUS * scale * np.sin(angle) * AXIS, (away * scale)[:, 0]
     axes = AXES if name == "ellipsoid" else RADIUS
     return CENTER + scale * axes * directions / np.linalg.norm(directions, axis=1)[:, None], scale[:, 0] ** 2
 
@@ -66,12 +77,16 @@ def _observe(name, points):
     depths, apart = _depths(name, points), points - CENTER
     if name == "ellipsoid":
         third = apart[..., 2] ** 2
+    elif name == "torus":
+        third = np.linalg.norm(apart - (apart @ AXIS)[..., None] * AXIS, axis=-1)
     else:
         third = (np.abs(apart @ AXIS) > 0.5 * LENGTH) * (name == "capsule")
     return np.stack([depths, depths**2, third], axis=-1)
 
 
-@pytest.mark.sample("^plane-20.0-1000|^sphere-20.0-10.0|^capsule-20.0-1000|^ellipsoid-0.02-10")
+@pytest.mark.sample(
+    "^plane-20.0-1000|^sphere-20.0-10.0|^capsule-20.0-1000|^torus-20.0-1000|^torus-0.02-10|^ellipsoid-0.02-10"
+)
 @pytest.mark.parametrize(("stiffness", "relaxations"), [(0.02, 0.1), (0.02, 10.0), (20.0, 10.0), (20.0, 1000.0)])
 @pytest.mark.parametrize("name", SHAPES)
 def test_particles_on_surfaces(name, stiffness, relaxations):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from openmm import unit
 
-from openmm_cylchain import Box, Capsule, Cylinder, Ellipsoid, InputError, Plane, Slab, Sphere, random_points_on
+from openmm_cylchain import Box, Capsule, Cylinder, Ellipsoid, InputError, Plane, Slab, Sphere, Torus, random_points_on
 
 COUNT = 20000
 LOWER, UPPER = np.array([-40.0, -60.0, -50.0]), np.array([70.0, 50.0, 30.0])
@@ -16,6 +16,7 @@ SHAPES = {
     "sphere": Sphere([5, 0, 0], 45.0),
     "box": Box([-10, -20, -30], [20, 30, 40]),
     "capsule": Capsule([5, 0, -5], TILTED, 40.0, 20.0),
+    "torus": Torus([5, 0, -5], TILTED, 35.0, 15.0),
     "ellipsoid": Ellipsoid([5, 0, 0], [60, 20, 35]),
 }
 
@@ -47,6 +48,13 @@ def _areas_beyond(shape, heights):
         caps = height[..., None] * shape.axis + shape.radius * sine[..., None] * round_
         sizes = shape.length, 2 * shape.radius
         faces = [(shape.center + own, np.full(one.shape, size)) for own, size in zip((side, caps), sizes)]
+    elif isinstance(shape, Torus):
+        across = np.linalg.svd(shape.axis[None])[2][1:]
+        angle, about = 2 * np.pi * one, 2 * np.pi * other
+        round_ = np.cos(angle)[..., None] * across[0] + np.sin(angle)[..., None] * across[1]
+        away = shape.major_radius + shape.minor_radius * np.cos(about)
+        points = away[..., None] * round_ + shape.minor_radius * np.sin(about)[..., None] * shape.axis
+        faces = [(shape.center + points, away)]
     else:
         normal = shape.axis if isinstance(shape, Cylinder) else shape.normal
         across = np.linalg.svd(normal[None])[2][1:]
@@ -75,6 +83,10 @@ def test_points_are_on_walls_with_the_same_chance_for_each_area(name):
     outward = points + 1e-6 * np.sign(points - 0.5) if isinstance(shape, Box) else None
     if isinstance(shape, (Sphere, Ellipsoid, Capsule)):
         outward = points + 1e-6 * (points - shape.center)
+    elif isinstance(shape, Torus):
+        across = points - shape.center - np.outer((points - shape.center) @ shape.axis, shape.axis)
+        middles = shape.major_radius * across / np.linalg.norm(across, axis=1)[:, None]
+        outward = points + 1e-6 * (points - shape.center - middles)
     elif isinstance(shape, Cylinder):
         apart = points - shape.point
         outward = points + 1e-6 * (apart - np.outer(apart @ shape.axis, shape.axis))

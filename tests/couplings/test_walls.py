@@ -6,7 +6,7 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError
-from openmm_cylchain.couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
+from openmm_cylchain.couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, Torus
 from openmm_cylchain.couplings.walls import wall_force
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
@@ -113,6 +113,9 @@ def test_bad_input_is_refused():
         (lambda: Capsule([0, 0, 0], [0, 0, 0], 1, 1), "Capsule: direction must not be the zero vector"),
         (lambda: Capsule([0, 0, 0], [1, 0, 0], 0, 1), "Capsule: length must be positive"),
         (lambda: Capsule([0, 0, 0], [1, 0, 0], 1, -1), "Capsule: radius must be positive"),
+        (lambda: Torus([0, 0, 0], [0, 0, 0], 2, 1), "Torus: direction must not be the zero vector"),
+        (lambda: Torus([0, 0, 0], [1, 0, 0], 2, 0), "Torus: minor_radius must be positive"),
+        (lambda: Torus([0, 0, 0], [1, 0, 0], 2, 2 * unit.nanometer), "must be smaller than major_radius, 2 nm"),
         (lambda: Ellipsoid([0, 0, 0], [1, -1, 1]), "Ellipsoid: semi_axes must be positive"),
         (lambda: wall_force("sphere", 1, []), "shape must be a Shape"),
         (lambda: wall_force(SHAPES[0], 0, []), "stiffness must be positive"),

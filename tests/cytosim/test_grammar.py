@@ -128,7 +128,8 @@ def test_runs_between_which_nothing_happens_are_one(tmp_path):
 PARTS = (
     "set fiber actin { rigidity = 1 }\nset hand grip { binding = 1, 0.1 }\n"
     "set couple link { hand1 = grip; hand2 = grip }\nnew actin\nrun 10 system\n"
-    "delete 1 actin\nchange actin { rigidity = 2 }\nnew actin\nnew 5 link\nrun 100 system { nb_frames = 2 }\n"
+    "delete 1 actin { position = inside, box }\nchange actin { rigidity = 2 }\nnew actin\nnew 5 link\n"
+    "run 100 system { nb_frames = 2 }\n"
     "change system { time_step = 0.02 }\nnew 4 link { mark = 1 }\nrun 50 system\nreport fiber x\nrun 25 system\n"
     "delete 2 link\nrun 60 system\ndelete link { mark = 1 }\ndelete link { state1 = 0 }\nrun 70 system\n"
     "cut actin { plane = 1 0 0, 0 }\nrun 20 system\n"

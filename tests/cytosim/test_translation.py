@@ -441,6 +441,12 @@ def test_walls_contacts_and_boxes(tmp_path):
     found, document = translated(tmp_path, own, cell=capsule)
     assert found.walls[0].shape.length == 6000 and found.walls[0].shape.radius == 1000
     assert document.missing == []
+    for dimensions in (3, 2):
+        torus = "set space cell { shape = torus }\nnew cell { curvature = 6; width = 3 }\n"
+        found, document = translated(tmp_path, own, system.replace("dim = 3", f"dim = {dimensions}"), cell=torus)
+        shape = found.walls[0].shape
+        assert (shape.major_radius, shape.minor_radius, shape.axis.tolist()) == (6000, 1500, [0, 0, 1])
+        assert document.missing == []
 
 
 def test_walls_of_some_fibers_and_several_of_one(tmp_path):
@@ -535,7 +541,7 @@ def test_two_dimensions_are_found(tmp_path):
 
 
 def test_parts_and_fields_are_said(tmp_path):
-    text = TUBE + "new tube\nset field ball { confine = off }\nnew ball\nrun 5000 system\ndelete tube\n"
+    text = TUBE + "new tube\nset field ball { confine = off }\nnew ball\nrun 5000 system\ncut tube\n"
     text += "new tube\n"
     _, document = translated(tmp_path, text)
     assert document.missing == ["stages: filaments that go, are cut, or come and grow", "fields"]
@@ -647,6 +653,60 @@ def test_fibers_that_grow_do_not_come_with_a_run(tmp_path):
     found, document = translated(tmp_path, text + "new tube\nrun 5 system\nnew tube\n")
     assert not found.stages
     assert document.missing == ["stages: filaments that go, are cut, or come and grow"]
+
+
+def test_fibers_go_with_a_run(tmp_path):
+    """So many of them, or all; those that grow, too; not those that are cut or go by where they are."""
+    other = TUBE.replace("fiber tube", "fiber actin")
+    grown = TUBE.replace("fiber tube", "fiber micro")
+    grown = grown.replace("segmentation", "activity = grow; growing_speed = 0.1; segmentation")
+    text = TUBE + other + grown + "new 4 tube { length = 3 }\nnew 6 actin { length = 2 }\nnew 3 micro\n"
+    text += (
+        "run 100 system\ndelete 2 tube\nrun 50 system\ndelete all actin\ndelete 1 micro\nrun 50 system\ndelete 9 tube\n"
+    )
+    found, document = translated(tmp_path, text)
+    assert document.missing == []
+    every = [stage.configuration.filaments for stage in found.stages]
+    counts = [[own.delete and own.delete.count for own in groups] for groups in every]
+    assert counts == [[None] * 3, [2, None, None], [None, None, 1], [2, None, None]]
+    assert [own.delete is not None for own in every[2]] == [False, True, True]
+    several = TUBE + "new 2 tube { length = 3 }\nnew 3 tube { length = 1 }\nrun 5 system\ndelete 4 fiber\n"
+    found, document = translated(tmp_path, several)
+    assert document.missing == []
+    assert [own.delete.count for own in found.stages[1].configuration.filaments] == [2, 2]
+    for what in ("delete tube { position = inside, cell }", "cut tube { plane = 1 0 0, 0 }"):
+        found, document = translated(tmp_path, TUBE + f"new 4 tube {{ length = 3 }}\nrun 100 system\n{what}\n")
+        assert not found.stages
+        assert document.missing == ["stages: filaments that go, are cut, or come and grow"]
+
+
+@pytest.mark.parametrize(
+    "points", ["order = 5; radius = 3", "points = 0 0, 0 2, 3 3, 2 0, 1 0", "points = 0 0, 4 0, 2 3"]
+)
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_convex_polygons_have_planes(tmp_path, points, dimensions):
+    tube = TUBE.replace("segmentation", "confine = inside, 100; segmentation")
+    points += "; height = 2" * (dimensions == 3)
+    cell = f"set space cell {{ shape = polygon }}\nnew cell {{ {points} }}\n"
+    system = SYSTEM.replace("dim = 3", f"dim = {dimensions}")
+    found, document = translated(tmp_path, tube + "new 3 tube { length = 0.5 }\n", system, cell=cell)
+    assert document.missing == []
+    space = make_space("polygon", [settings_with(points)], dimensions)
+    places = space.middle + 1.5 * np.array([*space.half[:2], 1.0]) * np.random.default_rng(2).uniform(-1, 1, (3000, 3))
+    places[:, 2] *= dimensions == 3
+    within = np.all([own.shape.square_depth(1e3 * places) == 0.0 for own in found.walls], axis=0)
+    np.testing.assert_array_equal(within, space.inside(places))
+    assert 300 < within.sum() < 2700
+    corners = {"order = 5": 5, "points = 0 0, 0": 4, "points = 0 0, 4": 3}
+    assert len(found.walls) == next(own for name, own in corners.items() if points.startswith(name)) + dimensions - 2
+
+
+@pytest.mark.parametrize("points", ["points = 0 0, 3 0, 3 1, 1 1, 1 3, 0 3", "points = 0 3, 2 -2, -3 1, 3 1, -2 -2"])
+def test_other_polygons_have_no_walls(tmp_path, points):
+    tube = TUBE.replace("segmentation", "confine = inside, 100; segmentation")
+    cell = f"set space cell {{ shape = polygon }}\nnew cell {{ {points}; height = 2 }}\n"
+    found, document = translated(tmp_path, tube + "new 3 tube { length = 0.5 }\n", cell=cell)
+    assert document.missing == ["walls: polygon"] and not found.walls
 
 
 def test_what_a_stage_cannot_change_is_said(tmp_path):

@@ -12,7 +12,7 @@ from PIL import Image
 
 from openmm_cylchain import InputError, Plane, Slab, Sphere, analysis
 from openmm_cylchain.cli import main
-from openmm_cylchain.couplings.shapes import Box, Capsule, Cylinder, Ellipsoid
+from openmm_cylchain.couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Torus
 from openmm_cylchain.output.colors import PLUS_END_COLOR, colors_of_filaments
 from openmm_cylchain.rendering.annotations import Margins, clock_text, margins, scale_bar_length
 from openmm_cylchain.rendering.camera import camera_on
@@ -314,6 +314,7 @@ WALLS = [
     Ellipsoid([0, 0, 0], [3000, 2000, 1000]),
     Cylinder([0, 0, 0], [1, 1, 0], 2000),
     Capsule([100, 0, 0], [1, 1, 0], 3000, 1000),
+    Torus([100, 0, 0], [1, 1, 0], 3000, 1000),
     Box([-2000] * 3, [3000] * 3),
     Slab([0, 0, 10], [0, 0, 1], 900),
     Plane([0, 0, -500], [0, 1, 1]),
@@ -341,6 +342,9 @@ def test_walls_are_drawn_where_they_are(two_types, wall):
     )
     if isinstance(wall, Plane):
         outwards = np.tile(-50.0 * wall.normal, (len(lines), 1))
+    if isinstance(wall, Torus):
+        across = lines - middle - np.outer((lines - middle) @ wall.axis, wall.axis)
+        outwards = 0.02 * (lines - middle - 3000 * across / np.linalg.norm(across, axis=1)[:, None])
     if isinstance(wall, Cylinder):
         outwards -= np.outer(outwards @ wall.axis, wall.axis)
     assert np.all(wall.square_depth(lines + outwards) > 0)

@@ -24,6 +24,7 @@ from openmm_cylchain import (
     Plane,
     Slab,
     Sphere,
+    Torus,
     capsule_contact_force,
     constant_force,
     constant_tension,
@@ -94,6 +95,10 @@ def assert_same_system(one, system):
         ('shape = "cylinder"\naxis = [0, 0, 2]\nradius = "2 um"', Cylinder([0, 0, 0], [0, 0, 2], 2000)),
         ('shape = "box"\nlower = ["-1 um", "-1 um", "-1 um"]\nupper = ["1 um", "1 um", "2 um"]', None),
         ('shape = "capsule"\nlength = "4 um"\nradius = "2 um"', Capsule([0, 0, 0], [1, 0, 0], 4000, 2000)),
+        (
+            'shape = "torus"\nmajor_radius = "4 um"\nminor_radius = "2 um"\naxis = [0, 0, 1]',
+            Torus([0, 0, 0], [0, 0, 1], 4000, 2000),
+        ),
         ('shape = "ellipsoid"\nsemi_axes = ["1 um", "2 um", "3 um"]', Ellipsoid([0, 0, 0], [1000, 2000, 3000])),
     ],
 )
@@ -222,6 +227,9 @@ def test_places_in_a_region():
         'shape = "capsule", axis = [1, 1, 0], radius = "250 nm", length = "1 um"': lambda x: (
             Capsule([0, 0, 0], [1, 1, 0], 1000, 250).square_depth(x) == 0
         ),
+        'shape = "torus", axis = [1, 1, 0], major_radius = "700 nm", minor_radius = "220 nm"': lambda x: (
+            Torus([0, 0, 0], [1, 1, 0], 700, 220).square_depth(x) == 0
+        ),
         'shape = "box", lower = ["0 um", "0 um", "0 um"], upper = ["1 um", "1 um", "1 um"]': lambda x: (
             (x >= 0) & (x <= 1000)
         ).all(axis=1),
@@ -259,6 +267,7 @@ VOLUMES = {
     'shape = "ellipsoid"\nsemi_axes = ["500 nm", "400 nm", "300 nm"]': (0.08 * np.pi, 0.08 * np.pi),
     'shape = "box"\nlower = ["0 um", "0 um", "0 um"]\nupper = ["1 um", "2 um", "1 um"]': (2.0, 2.0),
     'shape = "capsule"\nradius = "300 nm"\nlength = "1 um"': (0.126 * np.pi, 0.126 * np.pi),
+    'shape = "torus"\nmajor_radius = "500 nm"\nminor_radius = "200 nm"\naxis = [1, 2, 0]': (0.04 * np.pi**2,) * 2,
     'shape = "slit"\nthickness = "200 nm"\nnormal = [0, -2, 0]': (None, 0.8),
     'shape = "cylinder"\nradius = "200 nm"\naxis = [0, 0, 1]': (None, np.pi * 0.08),
     # Larger than the box, askew, or of one side.

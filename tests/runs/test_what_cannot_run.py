@@ -217,7 +217,7 @@ def test_a_dry_run_counts_steps_reports_checkpoints_and_motions_of_tethers(tmp_p
             costs = (app.Simulation, "step", 1e-3), (recorder, "_report", 0.1), (recorder, "_write_checkpoint", 1.0)
             clock = Clock(patch, (*costs, (runs.MovingTethers, "move", 0.02)))
             (stage,) = stages_of(configuration)
-            own = recorder(stage, built.filaments, simulation, RunDirectory(tmp_path), None)
+            own = recorder(stage, built, simulation, RunDirectory(tmp_path), None)
             if way == "run_to_end":
                 own.run_to_end(SimpleNamespace(received=None), SimpleNamespace(update=lambda step: None))
                 took.append(clock.now)

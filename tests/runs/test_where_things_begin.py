@@ -7,8 +7,9 @@ from openmm_cylchain.errors import InputError, InstabilityError
 from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.created_simulation import begin, create_simulation
 from openmm_cylchain.runs.initial_state import build_system
-from openmm_cylchain.runs.keys import ConfigurationError
+from openmm_cylchain.runs.keys import ConfigurationError, Place
 from openmm_cylchain.runs.relaxation import relaxed_positions
+from openmm_cylchain.runs.tables.shapes import REGION, Region
 from openmm_cylchain.systems.filaments import Filaments
 
 HEAD = '[solvent]\ntemperature = "298 K"\nviscosity = "10 mPa*s"\n'
@@ -117,3 +118,15 @@ def test_filaments_that_cannot_come_apart_are_shifted(planar, monkeypatch):
     with pytest.raises(InputError, match="have not come apart"):
         relaxed_positions(configuration, built)
     assert len(begun_at) == 4
+
+
+def test_places_in_a_torus_have_the_same_chance():
+    """The mean distance from the axis is R + r^2/4R, and half of all are below the plane of the circle."""
+    table = {"shape": "torus", "axis": [0, 0, 1], "major_radius": "300 nm", "minor_radius": "200 nm"}
+    region, generator = Region(REGION.read(table, Place("inside", ()))), np.random.default_rng(2)
+    points = np.array([region.draw(generator) for _ in range(20000)])
+    assert region.contains(points) and region.volume == pytest.approx(2 * np.pi**2 * 300 * 200**2)
+    distances = np.hypot(*points[:, :2].T)
+    error = distances.std() / np.sqrt(len(distances))
+    assert distances.mean() == pytest.approx(300 + 200**2 / 1200, abs=4 * error) and error < 0.05 * 200**2 / 1200
+    assert np.mean(points[:, 2] < 0) == pytest.approx(0.5, abs=2 / np.sqrt(len(points)))

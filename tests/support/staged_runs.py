@@ -89,3 +89,106 @@ concentration = "0 uM"
 """
 )
 """Filaments that grow, of which monomers are taken away in the last stage."""
+
+DELETING = """
+[solvent]
+temperature = "300 K"
+viscosity = "1 mPa*s"
+[[filament]]
+name = "ROD"
+diameter = "10 nm"
+segment_length = "100 nm"
+persistence_length = "10 um"
+stretching_modulus = "1 nN"
+segments = 4
+count = 40
+inside = { shape = "sphere", radius = "0.6 um" }
+[[link]]
+within = "60 nm"
+count = 20
+stiffness = "0.1 pN/nm"
+[[linkers]]
+name = "glue"
+stiffness = "0.1 pN/nm"
+rest_length = "20 nm"
+hand = { binding_rate = "1e5 1/s", reach = "60 nm", unbinding_rate = "100 1/s" }
+count = 60
+volume = "0.1 um^3"
+[[wall]]
+shape = "sphere"
+radius = "0.61 um"
+stiffness = "0.1 pN/nm"
+[contacts]
+diameter = "20 nm"
+[simulation]
+time_step = "0.5 us"
+report_interval = "50 us"
+checkpoint_interval = "50 us"
+seed = 4
+checks = false
+[[stage]]
+duration = "0.1 ms"
+[[stage]]
+name = "one side"
+duration = "0.1 ms"
+filament.ROD.delete = { inside = { shape = "sphere", center = ["0.5 um", "0 um", "0 um"], radius = "0.5 um" } }
+[[stage]]
+name = "thinned"
+repeat = 2
+[[stage.stage]]
+duration = "0.1 ms"
+filament.ROD.delete = { count = 5 }
+"""
+"""Filaments in a cell that links and linkers join, of which some go: those on one side, and twice five others."""
+
+DELETING_GROWN = """
+[solvent]
+temperature = "300 K"
+viscosity = "1 mPa*s"
+[[monomers]]
+name = "unit"
+length = "5 nm"
+plus_on_rate = "400 1/(uM*s)"
+plus_off_rate = "300 1/s"
+concentration = "6 uM"
+volume = "2 um^3"
+[[filament]]
+name = "GROWS"
+diameter = "10 nm"
+segment_length = "100 nm"
+persistence_length = "10 um"
+stretching_modulus = "1 nN"
+segments = 4
+count = 20
+inside = { shape = "sphere", radius = "0.4 um" }
+growth = { longest = "2 um", minus_capped = true, severing_rate = "0.5 1/(um*s)" }
+reserve = 20
+[[branching]]
+table = 1
+rate = "50 1/(um*s)"
+count = 10
+[[linkers]]
+name = "glue"
+stiffness = "0.1 pN/nm"
+rest_length = "20 nm"
+hand = { binding_rate = "1e5 1/s", reach = "60 nm", unbinding_rate = "1 1/s" }
+count = 30
+volume = "0.1 um^3"
+[simulation]
+time_step = "10 us"
+report_interval = "2.5 ms"
+checkpoint_interval = "2.5 ms"
+seed = 4
+checks = false
+[[stage]]
+duration = "20 ms"
+[[stage]]
+name = "fewer"
+duration = "5 ms"
+filament.GROWS.delete = { count = 15 }
+[[stage]]
+name = "middle"
+duration = "5 ms"
+filament.GROWS.delete = { outside = { shape = "sphere", radius = "0.4 um" } }
+"""
+"""Filaments that grow, branch and are cut, of which some go, and then those that are far from the middle."""

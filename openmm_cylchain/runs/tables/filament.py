@@ -14,6 +14,7 @@ from ...units import quantities as units
 from ..keys import Choice, Either, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
 from ..start_files import read_start
 from ..table import ACTIVE, TableKind
+from .deletion import DELETE, DELETE_EXAMPLE, Deletion, read_deletion
 from .filament_types import MONOMER_LENGTHS, TYPE_KEYS, read_filament_type
 from .growth import GROWTH, GROWTH_EXAMPLE, SEVERING_EXAMPLE, read_growth
 from .shapes import REGION, REGION_EXAMPLE, Region
@@ -132,6 +133,7 @@ FILAMENT = TableKind(
             "How many places there are for parts of filaments that are cut, with growth = { severing_rate = ... }.",
         ),
         ACTIVE,
+        Key("delete", Inline(DELETE, DELETE_EXAMPLE), None, "In a `[[stage]]`: filaments that go as it begins."),
         Key("file", Text('"start.npz"'), None, "Start from a file: see below."),
         Key("topology", Text('"topology.cif"'), None, "Topology of a file that is a trajectory."),
         Key("frame", Whole(-(10**12), 10**12, "-1"), None, "Which frame of a trajectory; the last one if not given."),
@@ -184,6 +186,7 @@ class FilamentGroup:
     spare_nodes: int = 0
     own_path: tuple = ()
     active: bool = True
+    delete: Deletion | None = None
     nucleation: Nucleation | None = dataclasses.field(default=None, compare=False)
     on_body: bool = False
 
@@ -233,6 +236,8 @@ def read_filaments(entries, table, solvent, box, folder, monomers):
     growth = None if entries["growth"] is None else read_growth(entries["growth"], monomers)
     own = {"planar": True} if entries["planar"] else {}
     common = {key: entries[key] for key in ("propulsion", "height", "active")} | {"table": table}
+    if entries["delete"] is not None:
+        common["delete"] = read_deletion(entries["delete"])
     if growth is not None and not entries["active"]:
         raise entries.at("active").error("is false, but these filaments grow: let them begin by [[nucleation]].")
     if growth is None:

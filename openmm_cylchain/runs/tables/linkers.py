@@ -303,8 +303,8 @@ def read_linkers(entries, groups, box, seed, walls=(), bodies=()):
         if region is None and not is_closed([wall.shape.region for wall in around], box is not None):
             raise entries.error(
                 f"linkers that diffuse need a region: inside = {REGION_EXAMPLE}, a [[wall]] that is closed (a sphere, "
-                f"a capsule, an ellipsoid or a box), or a periodic [box] with edges = {EDGES.example}, in which there "
-                "may be a slit or a cylinder."
+                f"a capsule, a torus, an ellipsoid or a box), or a periodic [box] with edges = {EDGES.example}, in "
+                "which there may be a slit or a cylinder."
             )
     elif group.count is not None and group.volume is None and (box is None or walls):
         group = dataclasses.replace(group, volume=_volume(entries, walls, box))
@@ -353,9 +353,10 @@ def _check_severing(entries, hand, groups):
 def _volume(entries, walls, box):
     volume = volume_of_walls(walls, box)
     if volume is None:
+        fits = "" if box is None else " that is no larger than the periodic one"
         reason = (
-            f"which what there is of [[wall]] and [box] does not say: add a [[wall]] that is closed (a sphere, a "
-            f"capsule, an ellipsoid or a box{'' if box is None else ' that is no larger than the periodic one'}), or"
+            f"which what there is of [[wall]] and [box] does not say: add a [[wall]] that is closed (a sphere, "
+            f"a capsule, a torus, an ellipsoid or a box{fits}), or"
             if any(wall.held_types is None for wall in walls)
             else f"which nothing says: add a periodic [box] with edges = {EDGES.example}, or"
         )

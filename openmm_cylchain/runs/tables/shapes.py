@@ -11,6 +11,7 @@ from ...couplings.shapes import (
     Plane,
     Slab,
     Sphere,
+    Torus,
     bounds_of,
     volume_of,
 )
@@ -24,10 +25,11 @@ _SHAPES = {
     "sphere": (Sphere, ("center", "radius")),
     "cylinder": (Cylinder, ("point", "axis", "radius")),
     "capsule": (Capsule, ("center", "axis", "length", "radius")),
+    "torus": (Torus, ("center", "axis", "major_radius", "minor_radius")),
     "box": (Box, ("lower", "upper")),
     "ellipsoid": (Ellipsoid, ("center", "semi_axes")),
 }
-_BOUNDED = ("sphere", "cylinder", "capsule", "box", "ellipsoid")
+_BOUNDED = ("sphere", "cylinder", "capsule", "torus", "box", "ellipsoid")
 _ORIGIN = (0.0, 0.0, 0.0)
 
 _KEYS = (
@@ -39,10 +41,12 @@ _KEYS = (
     ),
     Key("normal", direction(), (0.0, 0.0, 1.0), "Normal of a plane, to the side of the filaments, or of a slit."),
     Key("thickness", Quantity(units.LENGTH), None, "Distance of the planes of a slit."),
-    Key("center", point(), _ORIGIN, "Centre of a sphere, a capsule or an ellipsoid."),
+    Key("center", point(), _ORIGIN, "Centre of a sphere, a capsule, a torus or an ellipsoid."),
     Key("radius", Quantity(units.LENGTH), None, "Radius of a sphere, a cylinder or a capsule."),
-    Key("axis", direction(), (1.0, 0.0, 0.0), "Direction of the axis of a cylinder or a capsule."),
+    Key("axis", direction(), (1.0, 0.0, 0.0), "Direction of the axis of a cylinder, a capsule or a torus."),
     Key("length", Quantity(units.LENGTH), None, "Length of a capsule without its caps, which are half spheres."),
+    Key("major_radius", Quantity(units.LENGTH), None, "Of the circle in the middle of the tube of a torus."),
+    Key("minor_radius", Quantity(units.LENGTH), None, "Of that tube."),
     Key("lower", point(), None, "Corner of a box, along the axes of space."),
     Key("upper", point(), None, "The opposite corner."),
     Key("semi_axes", point(), None, "Semi-axes of an ellipsoid along x, y and z."),
@@ -120,6 +124,11 @@ class Region:
         """Of the box around it in nm: no two points of it are further apart."""
         return float(np.linalg.norm(self._upper - self._lower))
 
+    @property
+    def center(self):
+        """Of the box around it: (3,) in nm."""
+        return 0.5 * (self._lower + self._upper)
+
     def _bounds(self):
         shape = self._shape
         if isinstance(shape, Cylinder):
@@ -129,7 +138,7 @@ class Region:
 
     def draw(self, generator):
         """A random point in it: a (3,) array in nm."""
-        # A long cylinder or capsule that is tilted fills next to nothing of the box around it.
+        # A long cylinder or capsule that is tilted, or a thin torus, fills next to nothing of the box around it.
         shape = self._shape
         if isinstance(shape, Cylinder):
             return shape.point + _draw_in_cylinder(shape, self._length, generator)
@@ -139,6 +148,8 @@ class Region:
             direction = generator.normal(size=3)
             direction *= shape.radius * np.cbrt(generator.uniform()) / np.linalg.norm(direction)
             return shape.center + direction + np.copysign(0.5 * shape.length, direction @ shape.axis) * shape.axis
+        if isinstance(shape, Torus):
+            return shape.center + _draw_in_torus(shape, generator)
         while True:
             point = generator.uniform(self._lower, self._upper)
             if self.contains(point):
@@ -158,6 +169,19 @@ def _draw_in_cylinder(shape, length, generator):
     radius, angle = shape.radius * np.sqrt(generator.uniform()), generator.uniform(0.0, 2.0 * np.pi)
     along = length * generator.uniform(-0.5, 0.5)
     return along * shape.axis + radius * (np.cos(angle) * side + np.sin(angle) * other)
+
+
+def _draw_in_torus(shape, generator):
+    # From the center. Its volume grows with the distance from the axis.
+    _, side, other = np.linalg.svd(shape.axis[None])[2]
+    while True:
+        out, along = shape.minor_radius * generator.uniform(-1.0, 1.0, 2)
+        distance = shape.major_radius + out
+        share = generator.uniform() * (shape.major_radius + shape.minor_radius)
+        if out**2 + along**2 <= shape.minor_radius**2 and share < distance:
+            break
+    angle = generator.uniform(0.0, 2.0 * np.pi)
+    return distance * (np.cos(angle) * side + np.sin(angle) * other) + along * shape.axis
 
 
 def volume_within(shapes, box):

@@ -163,8 +163,8 @@ void CylinderChainBindingForceImpl::placeUnbound(cylchain::LinkerState& changed)
         require(!type.diffuses() ||
                 cylchain::isBounded(system.wallsOf(type), owner.usesPeriodicBoundaryConditions()),
                 "Linkers that diffuse need a region: add a CylinderChainWallForce that is closed (a sphere, a capsule, "
-                "a box or an ellipsoid), or a cylinder with a slab across it, or have a periodic box, with nothing but "
-                "slabs and cylinders in it");
+                "a torus, a box or an ellipsoid), or a cylinder with a slab across it, or have a periodic box, with "
+                "nothing but slabs and cylinders in it");
     for (size_t i = 0; 3*i < changed.positions.size(); i++) {
         const cylchain::LinkerType& type = system.types[changed.linkers[i].type];
         const double* position = &changed.positions[3*i];

@@ -301,7 +301,7 @@ void CylinderChainGrowthForceImpl::setState(const GrowthState& replaced) {
         const GrowingChain& own = system.chains[i];
         const Chain& chain = list.getChain(growing[i]);
         const int most = chain.nodes.size()+chain.spareNodes.size();
-        const bool isNone = range.first == 0 && range.last == 0 && (own.vanishes || owner.getRanges()[i].size() == 0);
+        const bool isNone = range.first == 0 && range.last == 0 && chain.tethers.empty();
         requireOfGrowing(isNone || (range.first < range.last && range.size() >= own.leastMonomers &&
                 SegmentDivision(range, system.tables[own.table].monomersPerSegment).countSegments() < most), "Chain "+
                 to_string(growing[i])+" cannot have monomers "+to_string(range.first)+" to "+to_string(range.last)+

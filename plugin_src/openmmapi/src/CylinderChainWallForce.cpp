@@ -57,8 +57,11 @@ void CylinderChainWallForce::setRegion(const string& shape, const Vec3& point, c
     }
     if (kind == WallShape::Capsule)
         requireOfWall(vector.dot(vector) > 0, "The vector to a cap of a capsule cannot be the zero vector");
+    if (kind == WallShape::Torus)
+        requireOfWall(vector.dot(vector) > length*length,
+                "The circle of a torus must have a larger radius than its tube");
     if (kind == WallShape::Slab || kind == WallShape::Sphere || kind == WallShape::Cylinder ||
-            kind == WallShape::Capsule)
+            kind == WallShape::Capsule || kind == WallShape::Torus)
         requireOfWall(length > 0, "The length of a "+shape+" must be positive");
     if (kind == WallShape::Box)
         requireOfWall(vector[0] > point[0] && vector[1] > point[1] && vector[2] > point[2],

@@ -11,7 +11,7 @@ namespace OpenMM {
 
 /**
  * This class keeps particles in a region: a half space, or the inside of a slab, sphere, cylinder, box,
- * ellipsoid or capsule.  It may also keep them outside of one, or hold them on its surface: see setSide().
+ * ellipsoid, capsule or torus.  It may also keep them outside of one, or hold them on its surface: see setSide().
  *
  * Where a sphere around a particle gets beyond the surface of the region by a depth d, the energy is (k/2) d^2.  Of a
  * slab or box, each plane counts by itself, so that the energy of a box is that of the distance from it.  The depth of
@@ -27,6 +27,8 @@ namespace OpenMM {
  *     "box"        the lower corner           the upper corner                 -
  *     "ellipsoid"  the center                 the semi-axes                    -
  *     "capsule"    the middle                 from it to where a cap begins    the radius
+ *     "torus"      the center                 the axis, as long as the radius  the radius of the tube
+ *                                             of its circle
  *
  * With other Integrators than CylinderChainIntegrator, and with its explicit schemes, the force is taken at the present
  * positions.  Implicit schemes have it in their equations, unless one of the particles is a virtual site.

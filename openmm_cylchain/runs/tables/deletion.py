@@ -1,0 +1,61 @@
+"""The ``delete`` of a [[filament]] table in a stage: which filaments go as it begins."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..keys import Inline, Key, Whole
+from ..table import TableKind
+from .shapes import REGION, REGION_EXAMPLE, Region
+
+DELETE = TableKind(
+    "delete",
+    (
+        Key(
+            "count", Whole(1, 10**7, "5"), None, "How many go, at random, or all if there are fewer; all if not given."
+        ),
+        Key(
+            "inside",
+            Inline(REGION, REGION_EXAMPLE),
+            None,
+            "A region: those go whose middles, the means of their nodes, are in it.",
+        ),
+        Key("outside", Inline(REGION, REGION_EXAMPLE), None, "A region: those go whose middles are not in it."),
+    ),
+    "Filaments that go, as a stage begins, with their monomers and with what is bound to them; see the page on stages.",
+)
+DELETE_EXAMPLE = "{ count = 5 }"
+
+
+@dataclass(frozen=True)
+class Deletion:
+    """Filaments that go: at most so many (all if ``count`` is None) of those on a side of a Region, if there is one."""
+
+    count: int | None
+    region: Region | None
+    outside: bool
+
+    def chosen(self, middles, box, generator):
+        """Which of filaments go, by the middles (n, 3) of these in nm in a box with edges (3,) in nm, or None.
+
+        Returns
+        -------
+        (m,) int array
+        """
+        places = np.arange(len(middles))
+        if self.region is not None:
+            if box is not None:
+                center = self.region.center
+                middles = middles - box * np.round((middles - center) / box)
+            inside = np.array([self.region.contains(own) for own in middles], dtype=bool)
+            places = places[inside != self.outside]
+        if self.count is None or self.count >= len(places):
+            return places
+        return np.sort(generator.choice(places, self.count, replace=False))
+
+
+def read_deletion(entries):
+    """The Deletion of Entries of DELETE."""
+    entries.only_one("inside", "outside")
+    region = entries["inside"] or entries["outside"]
+    return Deletion(entries["count"], None if region is None else Region(region), "outside" in entries)
