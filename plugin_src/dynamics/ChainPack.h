@@ -16,8 +16,8 @@ struct LaneTether : Tether {
 /** Twist of the chains of a pack, all of which have the same number of segments. See ChainTwist. */
 template <class Scalar> struct PackTwist {
     /**
-     * Of the joint at each node, [node][lane]: the stiffness, the angle at rest, how fast it is turned, and a torque that
-     * is there in any case. The last two are those of end frames.
+     * Of the joint at each node, [node][lane]: the stiffness, the angle at rest, how fast it is turned, and a torque
+     * that is there in any case. The last two are those of end frames.
      */
     std::vector<Scalar> stiffness, rest, angularVelocity, torque;
     /** Of each segment, [segment][lane]; nothing if chains have no twist. */

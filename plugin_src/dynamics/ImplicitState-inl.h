@@ -93,8 +93,9 @@ public:
             twoStages(settings.scheme == Scheme::ImplicitSecondOrder),
             segments(memory.segments.template reserve<ImplicitSegment<Real> >(n)),
             tethers(memory.tethers.template reserve<ImplicitTether>(pack.tethers.size())),
-            f(memory.vectors.template reserve<Vec>(7*n)), loads(settings.flow.present || pack.twist.isPresent() ? f+3*n : f), change(f+n),
-            rest(f+2*n), external(twoStages ? f+4*n : f), random(twoStages ? f+5*n : f), drift(twoStages ? f+6*n : f),
+            f(memory.vectors.template reserve<Vec>(7*n)),
+            loads(settings.flow.present || pack.twist.isPresent() ? f+3*n : f), change(f+n), rest(f+2*n),
+            external(twoStages ? f+4*n : f), random(twoStages ? f+5*n : f), drift(twoStages ? f+6*n : f),
             joints(memory.joints.template reserve<TwistedJoint<Real> >(pack.twist.isPresent() ? n : 0)),
             gradient(memory.gradients.template reserve<Vec>(pack.twist.isHeld ? 3*n : 0)) {
     }

@@ -9,9 +9,9 @@
  *     c_s = turn_s - turn_(s-1) + swept_s,
  *
  * with the twist q_s of a joint at the start, and the area swept_s that the great circle between its tangents sweeps on
- * the unit sphere, by which the angle between frames that are carried along changes. That is done in each iteration, and the
- * torques T_s that come out are forces -T_s J_s(m) on nodes. What a change of the nodes does to T is in the equations as
- * far as all torques of a chain change together.
+ * the unit sphere, by which the angle between frames that are carried along changes. That is done in each iteration,
+ * and the torques T_s that come out are forces -T_s J_s(m) on nodes. What a change of the nodes does to T is in the
+ * equations as far as all torques of a chain change together.
  */
 
 /** Whether there are packs with twist: in double precision alone. */
@@ -44,8 +44,8 @@ template <class Real> CYLCHAIN_INLINE Real argument(Real x, Real y) {
 }
 
 /**
- * The area on the unit sphere that the great circle from a to b sweeps as it moves to that from newA to newB: positive if
- * a, b, newB, newA go around it counterclockwise, as seen from outside.
+ * The area on the unit sphere that the great circle from a to b sweeps as it moves to that from newA to newB: positive
+ * if a, b, newB, newA go around it counterclockwise, as seen from outside.
  */
 template <class Real> CYLCHAIN_INLINE Real sweptArea(const Vector<Real>& a, const Vector<Real>& b,
         const Vector<Real>& newA, const Vector<Real>& newB) {

@@ -97,8 +97,9 @@ const ChainKernels& cylchain::bestKernels() {
 }
 
 bool cylchain::mayShareLanes(const Chain& longest, const Chain& chain, double filling) {
+    const size_t most = longest.segments.size();
     const bool haveTwist = longest.twist.isPresent();
-    const size_t least = longest.closed || haveTwist ? longest.segments.size() : ceil((1-filling)*longest.segments.size());
+    const size_t least = longest.closed || haveTwist ? most : ceil((1-filling)*most);
     return hasSegmentFriction(chain) == hasSegmentFriction(longest) &&
             (chain.nodeFriction > 0) == (longest.nodeFriction > 0) && chain.bending == longest.bending &&
             chain.stretching == longest.stretching && chain.closed == longest.closed &&

@@ -7,7 +7,7 @@ namespace cylchain {
 
 /** A frame beyond an end of a chain, and the joint with which the last segment there holds on to it. */
 struct EndFrame {
-    /** Where the filament goes on there, from its first to its last node: a unit vector; zero at an end that is free. */
+    /** Where the filament goes on, from its first to its last node: a unit vector; zero at an end that is free. */
     double direction[3] = {};
     /** The stiffness of the joint against twist; zero if the frame turns freely about its direction. */
     double stiffness = 0;
@@ -17,8 +17,8 @@ struct EndFrame {
 
 /**
  * How a chain resists twist. Each segment has a material frame, which turns about the segment against a friction. The
- * twist m of a joint is the angle from the frame before it, carried over by parallel transport, to the one behind it; its
- * energy is (stiffness/2) (m-rest)^2.
+ * twist m of a joint is the angle from the frame before it, carried over by parallel transport, to the one behind it;
+ * its energy is (stiffness/2) (m-rest)^2.
  *
  * Twists are numbered by the node before their segment, as joints of closed chains are: that of an open chain with N
  * segments number 0 and N are those to the frames of its ends.

@@ -230,9 +230,10 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
     $result = SWIG_Python_AppendOutput($result, tuple, 1);
 }
 %apply std::vector<Vec3>& vectors {std::vector<Vec3>& jointForces, std::vector<Vec3>& directions};
-%apply Vec3& point {Vec3& direction, Vec3& vector, Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ, Vec3& origin};
-%apply const Vec3& point {const Vec3& direction, const Vec3& vector, const Vec3& velocity, const Vec3& gradientX, const Vec3& gradientY,
-        const Vec3& gradientZ, const Vec3& origin};
+%apply Vec3& point {Vec3& direction, Vec3& vector, Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ,
+        Vec3& origin};
+%apply const Vec3& point {const Vec3& direction, const Vec3& vector, const Vec3& velocity, const Vec3& gradientX,
+        const Vec3& gradientY, const Vec3& gradientZ, const Vec3& origin};
 %apply double& OUTPUT {double& restLength, double& stretchingStiffness, double& maximumExtension,
         double& parallelFriction, double& perpendicularFriction, double& rotationalFriction,
         double& extensionalFriction, double& length, double& stiffness, double& stretching, double& bending,

@@ -295,8 +295,8 @@ void CylinderChainForce::setChainTwist(int chain, const vector<double>& stiffnes
     }
     if (friction.size() != own.segments.size() || stiffness.size() != own.joints.size() ||
             rest.size() != own.joints.size())
-        throw OpenMMException("CylinderChainForce: Twist needs a stiffness and a rest angle of each joint, and a friction "
-                "of each segment");
+        throw OpenMMException("CylinderChainForce: Twist needs a stiffness and a rest angle of each joint, and a "
+                "friction of each segment");
     for (double value : stiffness)
         if (!(value > 0 && isfinite(value)))
             throw OpenMMException("CylinderChainForce: The stiffness of a joint against twist must be positive");
@@ -339,8 +339,8 @@ void CylinderChainForce::setEndFrame(int chain, int end, const Vec3& direction, 
     if (length == 0 && (stiffness > 0 || torque != 0))
         throw OpenMMException("CylinderChainForce: An end frame that is held, or has a torque, needs a direction");
     if (stiffness > 0 ? torque != 0 : angularVelocity != 0)
-        throw OpenMMException("CylinderChainForce: An end frame has a torque if it turns freely, and an angular velocity "
-                "if it is held");
+        throw OpenMMException("CylinderChainForce: An end frame has a torque if it turns freely, and an angular "
+                "velocity if it is held");
     cylchain::EndFrame& frame = own.twist.ends[end];
     for (int k = 0; k < 3; k++)
         frame.direction[k] = length > 0 ? direction[k]/length : 0.0;

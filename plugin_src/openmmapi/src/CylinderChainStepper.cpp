@@ -132,8 +132,8 @@ StepSettings CylinderChainStepper::describeStep(uint64_t seed, int level, uint64
     settings.precision = static_cast<Precision>(integrator.getPrecision());
     if (force.hasTwist()) {
         if (settings.scheme != Scheme::Implicit)
-            throw OpenMMException("CylinderChainIntegrator: Twist is for scheme Implicit alone, with the force group of "
-                    "the CylinderChainForce among the integration force groups");
+            throw OpenMMException("CylinderChainIntegrator: Twist is for scheme Implicit alone, with the force group "
+                    "of the CylinderChainForce among the integration force groups");
         settings.twists = &force.getTwists();
     }
     return settings;
