@@ -104,7 +104,7 @@ def _whole_frames(files, description):
         unfinished = held > 0 and (len(recorded) == 0 or recorded[-1] < expected[frames - 1])
         if unfinished and (description.frames is None or frames < description.frames):
             frames -= 1
-    for path in (files.pulling, files.growth, files.wall_forces, files.contact_forces):
+    for path in (files.pulling, files.twist, files.growth, files.wall_forces, files.contact_forces):
         if path.exists():
             frames = min(frames, len(read_reports(path)["step"]))
     return frames, energies

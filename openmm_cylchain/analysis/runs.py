@@ -151,6 +151,12 @@ class Run:
         return self._by_frame(self._files.pulling)
 
     @cached_property
+    def twist(self) -> dict[str, FloatArray]:
+        """Twist and torque of filaments with end frames: (frames, such filaments) arrays by the headers of
+        ``twist.csv``, empty without such."""
+        return self._by_frame(self._files.twist)
+
+    @cached_property
     def growth(self) -> dict[str, FloatArray]:
         """How far filaments have grown: (frames, filaments that grow) arrays by the headers of ``growth.csv``, empty
         without such."""

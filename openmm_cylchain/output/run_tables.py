@@ -1,5 +1,6 @@
 """The files of a run that grow while it goes on, and can be continued: its trajectory and its tables."""
 
+import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -145,6 +146,10 @@ PULLING_TABLE_COLUMNS = (
 """A line per report and moving tether; the extension is that of the end-to-end vector that points to the tether."""
 
 
+TWIST_COLUMNS = ("step", "time (ms)", "filament", "twist (turns)", "torque (pN nm)")
+"""A line per report and filament with end frames: the sum of its twists, and the mean torque of its joints."""
+
+
 _OF_END = ("gained (monomers)", "lost (monomers)", "waited", "state", "shrinking", "catastrophes", "rescues")
 
 POPULATION_COLUMNS = ("filaments nucleated", "filaments vanished", "filaments severed", "without place")
@@ -190,13 +195,22 @@ TABLE_COLUMNS = {
     "energies.csv": ENERGY_COLUMNS,
     "linkers.csv": LINKER_TABLE_COLUMNS,
     "pulling.csv": PULLING_TABLE_COLUMNS,
+    "twist.csv": TWIST_COLUMNS,
     "growth.csv": GROWTH_TABLE_COLUMNS,
     "wall_forces.csv": WALL_FORCE_COLUMNS,
     "contact_forces.csv": CONTACT_FORCE_COLUMNS,
 }
 """Columns by the names of files."""
 
-_SIZES = {"ms": MILLISECOND, "nm": 1.0, "pN": PICONEWTON, "pN nm": PICONEWTON, "kT": 1.0, "uM": 1e-6}
+_SIZES = {
+    "ms": MILLISECOND,
+    "nm": 1.0,
+    "pN": PICONEWTON,
+    "pN nm": PICONEWTON,
+    "kT": 1.0,
+    "uM": 1e-6,
+    "turns": 2.0 * math.pi,
+}
 # In OpenMM's units; but energies in kT and concentrations in mol/l come as such.
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from ..engine_choice import choose_engine
 from ..errors import InputError
+from ..filaments.twist import has_twist
 from ..kinetics.binding_force import BINDING_FORCE_NAME
 from ..mechanics.flow import Flow
 from .initial_state import recommended_step
@@ -23,6 +24,7 @@ from .tables.barriers import BARRIER, check_barriers, read_barrier
 from .tables.bodies import BODY, read_body, with_bodies
 from .tables.couplings import (
     CONTACTS,
+    END_FRAME,
     LINK,
     PULL,
     TETHER,
@@ -30,6 +32,7 @@ from .tables.couplings import (
     Contacts,
     check_walls,
     read_contacts,
+    read_end_frame,
     read_link,
     read_pull,
     read_tether,
@@ -64,6 +67,7 @@ TABLES = (
     JOINT,
     TETHER,
     PULL,
+    END_FRAME,
     CONTACTS,
     WALL,
     SIMULATION,
@@ -90,6 +94,7 @@ _OWNERS = (
     JOINT,
     TETHER,
     PULL,
+    END_FRAME,
     CONTACTS,
     WALL,
 )
@@ -122,6 +127,7 @@ class Configuration:
     joints: tuple = ()
     barriers: tuple = ()
     bodies: tuple = ()
+    end_frames: tuple = ()
     monomers: tuple = dataclasses.field(default=(), compare=False)
     tables: dict = dataclasses.field(default_factory=dict, compare=False, repr=False)
     start_files: dict = dataclasses.field(default_factory=dict, compare=False)
@@ -250,6 +256,7 @@ def _configuration(raw, text, folder, lines):
         tuple(read_joint(own, groups) for own in tables["joint"]),
         tuple(barrier for own in tables["barrier"] for barrier in read_barrier(own, groups)),
         bodies,
+        tuple(read_end_frame(own, groups) for own in tables["end_frame"]),
         monomers,
         tables,
         dict(_start_files(tables["filament"], folder)),
@@ -353,6 +360,7 @@ def _check_engine(settings, configuration):
         ("[[linkers]]", configuration.linkers),
         ("[contacts]", configuration.contacts),
         ("[[body]]", configuration.bodies),
+        ("[[end_frame]]", configuration.end_frames),
     ):
         if there:
             raise settings.at("engine").error(f'has no {header}: leave it out, or write "compiled".')
@@ -370,6 +378,7 @@ def _disturbed(configuration):
             tethered[number] = tethered.get(number, 0) + 1
     moving = {number for tether in configuration.tethers if tether.velocity for number in tether.filaments}
     pulled = {number for pull in configuration.pulls for number in pull.filaments}
+    framed = {number for frame in configuration.end_frames for number in frame.filaments}
     linked = {place["filament"] for link in configuration.links for place in link.between or ()}
     joined = {place["filament"] for joint in configuration.joints for place in joint.between}
     groups, first = [], 0
@@ -384,6 +393,7 @@ def _disturbed(configuration):
             "contacts": configuration.contacts is not None,
             "walls": any(wall.holds(group.type) for wall in configuration.walls),
             "forces": bool(pulled & numbers),
+            "frames": bool(framed & numbers) or (group.closed and has_twist(group.type)),
             "tethers": bool(moving & numbers)
             or any(tethered.get(number, 0) + bool(group.clamped) > 1 for number in numbers),
             "flow": configuration.flow is not None and not configuration.flow.is_at_rest,

@@ -63,7 +63,8 @@ def refuse_held(configuration, tables, place):
             raise place.error(f"deletes filaments that bodies hold ({group.label}), which stay: leave it out.")
     pulled = [("pull", own.filaments) for own in configuration.pulls]
     joined = [("joint", [end["filament"] for end in own.between]) for own in configuration.joints]
-    for name, numbers in (*(("tether", own.filaments) for own in configuration.tethers), *pulled, *joined):
+    framed = [("end_frame", own.filaments) for own in configuration.end_frames]
+    for name, numbers in (*(("tether", own.filaments) for own in configuration.tethers), *pulled, *joined, *framed):
         for number in numbers:
             if number is not None and owners[number].table in tables:
                 raise place.error(

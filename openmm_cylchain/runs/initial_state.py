@@ -119,6 +119,7 @@ def stands_alone(configuration):
         or configuration.walls
         or configuration.pulls
         or configuration.tethers
+        or configuration.end_frames
         or configuration.particles
         or configuration.bodies
         or configuration.flow
@@ -210,6 +211,12 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None, dele
             for number in own.filaments:
                 point = filaments[number].positions[own.node] if own.point is None else own.point
                 filaments.add_tether(number, own.node, point, own.stiffness)
+    for own, entries in zip(configuration.end_frames, configuration.tables["end_frame"]):
+        with entries.naming():
+            for number in own.filaments:
+                filaments.add_end_frame(
+                    number, own.end, own.direction, torque=own.torque, angular_velocity=own.angular_velocity
+                )
     for own, entries in zip(configuration.linkers if kinetics else (), configuration.tables["linkers"]):
         anchors = _anchors(own, configuration, filaments)
         # What is within reach of an anchor is known when overlaps have come apart: see ``relaxation``.

@@ -18,6 +18,7 @@ from ..output.growth_reporter import rows_of_growth
 from ..output.linker_records import LinkerFile, measure_linkers
 from ..output.progress import RunProgress
 from ..output.run_tables import ReportTable, TrajectoryFile
+from ..output.twist_rows import rows_of_twist
 from ..systems.described_runs import (
     energies_of_growing,
     energy_cells,
@@ -254,6 +255,7 @@ class Recorder:
         self._checkpoint = checkpoint
         self._step = 0 if checkpoint is None else checkpoint.step
         self._moving = MovingTethers(stage, filaments)
+        self._framed = sorted({frame.filament for frame in filaments.end_frames})
         self._grows = any(filament.growth is not None for filament in filaments)
         self._rows = RowsOfForces(self._stages, configuration)
 
@@ -285,6 +287,9 @@ class Recorder:
         if self._moving:
             self._pulling = ReportTable(self._directory.pulling, begun and begun.pulling_size)
             files.append(self._pulling)
+        if self._framed:
+            self._twist = ReportTable(self._directory.twist, begun and begun.twist_size)
+            files.append(self._twist)
         if self._grows:
             self._growth = ReportTable(self._directory.growth, begun and begun.growth_size)
             files.append(self._growth)
@@ -396,6 +401,8 @@ class Recorder:
             self._growth.write(self._step, (self._stage.time(self._step), *row))
         for row in self._moving.rows(self._step, positions):
             self._pulling.write(self._step, row)
+        for row in rows_of_twist(self._filaments, context, self._framed):
+            self._twist.write(self._step, (self._stage.time(self._step), *row))
 
     def _without_absent(self, positions):
         # Of a filament that is not there, all particles are in one place: that of a node that stands still.
@@ -451,6 +458,7 @@ class Recorder:
             linkers_size=self._linkers.synchronise() if self._filaments.linkers else 0,
             linker_records=self._places.synchronise() if self._filaments.linkers else 0,
             pulling_size=self._pulling.synchronise() if self._moving else 0,
+            twist_size=self._twist.synchronise() if self._framed else 0,
             force_sizes=self._forces.synchronise(),
             growth_size=self._growth.synchronise() if self._grows else 0,
             deleted=self._deleted,

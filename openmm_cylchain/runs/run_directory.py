@@ -31,6 +31,7 @@ class Checkpoint:
     linkers_size: int = 0
     linker_records: int = 0
     pulling_size: int = 0
+    twist_size: int = 0
     force_sizes: tuple[int, int] = (0, 0)
     growth_size: int = 0
     deleted: frozenset[int] = frozenset()
@@ -108,6 +109,7 @@ class RunDirectory(RunFiles):
             self.linker_places,
             self.crosslinks,
             self.pulling,
+            self.twist,
             self.growth,
             self.wall_forces,
             self.contact_forces,
@@ -147,6 +149,7 @@ class RunDirectory(RunFiles):
             "linkers_size": checkpoint.linkers_size,
             "linker_records": checkpoint.linker_records,
             "pulling_size": checkpoint.pulling_size,
+            "twist_size": checkpoint.twist_size,
             "force_sizes": checkpoint.force_sizes,
             "growth_size": checkpoint.growth_size,
             "deleted": sorted(checkpoint.deleted),
@@ -179,6 +182,7 @@ class RunDirectory(RunFiles):
                 linkers_size=header["linkers_size"],
                 linker_records=header["linker_records"],
                 pulling_size=header["pulling_size"],
+                twist_size=header["twist_size"],
                 force_sizes=tuple(header["force_sizes"]),
                 growth_size=header["growth_size"],
                 deleted=frozenset(header["deleted"]),

@@ -42,6 +42,7 @@ _DISTURBANCES = {
     "contacts": "contacts keep them apart",
     "walls": "walls confine them",
     "forces": "constant forces pull at them",
+    "frames": "their twist is held",
     "tethers": "tethers hold them in several places",
     "flow": "the solvent flows",
     "propulsion": "they propel themselves",

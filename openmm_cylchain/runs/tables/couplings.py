@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from ...couplings.walls import NODES, SIDES
 from ...filaments.attachments import lengths_along
+from ...filaments.twist import FILAMENT_ENDS
 from ...units import quantities as units
 from ..keys import (
     REQUIRED,
@@ -152,6 +153,30 @@ PULL = TableKind(
     repeated=True,
 )
 
+END_FRAME = TableKind(
+    "end_frame",
+    (
+        *_WHICH,
+        Key("end", Choice(FILAMENT_ENDS), REQUIRED, "minus is that of the first node, plus that of the last."),
+        Key(
+            "direction",
+            direction(),
+            (1.0, 0.0, 0.0),
+            "From minus to plus: where the filament would go on, or has come from.",
+        ),
+        Key("torque", Quantity(units.ENERGY, "any"), None, "Torque on a frame that turns freely; it is held if none."),
+        Key(
+            "angular_velocity",
+            Quantity(units.RATE, "any"),
+            0.0,
+            "Of a frame that is held: radians per time, about the direction.",
+        ),
+    ),
+    "What binds the material at an end of filaments with twist, such as a magnetic bead, see "
+    "`Filaments.add_end_frame`; `twist.csv` has twist and torque of these filaments at every report.",
+    repeated=True,
+)
+
 PLACE_KEYS = (
     Key("filament", Whole(0, None, "0"), None, "Number of a filament."),
     Key("arc_length", Quantity(units.LENGTH, "zero"), None, "Distance from its first node along it."),
@@ -259,6 +284,17 @@ class Pull:
 
 
 @dataclass(frozen=True)
+class EndFrameGroup:
+    """An [[end_frame]] table: a frame beyond the same end of some filaments; torque and velocity in OpenMM's units."""
+
+    filaments: tuple
+    end: str
+    direction: tuple
+    torque: float | None
+    angular_velocity: float
+
+
+@dataclass(frozen=True)
 class LinkGroup:
     """A [[link]] table: a pair of places, as dicts, or else random links; lengths in nm."""
 
@@ -359,6 +395,12 @@ def read_pull(entries, groups):
     if "node" in entries:
         _check_node(entries, numbers, groups)
     return Pull(numbers, entries["tension"], entries["direction"], entries["node"], entries["force"])
+
+
+def read_end_frame(entries, groups):
+    """The EndFrameGroup of an [[end_frame]] table."""
+    names = ("end", "direction", "torque", "angular_velocity")
+    return EndFrameGroup(_filaments(entries, groups), *(entries[name] for name in names))
 
 
 def read_link(entries, groups, bodies):

@@ -76,6 +76,8 @@ _QUANTITIES = {
         units.ROTATIONAL_FRICTION,
         "In place of extension_relaxation_time: friction of a change of length.",
     ),
+    "torsional_rigidity": (units.BENDING_RIGIDITY, "Torsional rigidity, C; without it, filaments have no twist."),
+    "twist_persistence_length": (units.LENGTH, "In place of torsional_rigidity: C over k_B T, as persistence_length."),
     "mass_per_length": (units.MASS_PER_LENGTH, "For other programs: motion does not depend on it."),
 }
 _TEXTS = ("name", "element", "bending_model", "stretching_model")
@@ -171,10 +173,17 @@ def _cylinder_type(entries, solvent, preset):
     properties = entries.given(*_CYLINDER_KEYS)
     if "end_corrections" in properties:
         properties["end_corrections"] = EndCorrections(**properties["end_corrections"].values)
-    if "persistence_length" in properties:
-        properties.setdefault("temperature", solvent.temperature)
+    lengths = entries.given("persistence_length", "twist_persistence_length")
+    if lengths:
+        temperature = properties.setdefault("temperature", solvent.temperature)
     else:
-        entries.refuse(("temperature",), "belongs to persistence_length; give both.")
+        entries.refuse(("temperature",), "belongs to persistence_length or twist_persistence_length; give both.")
+    if "twist_persistence_length" in properties and "torsional_rigidity" not in properties:
+        # A bending_rigidity beside it has no temperature.
+        length = properties.pop("twist_persistence_length")
+        properties["torsional_rigidity"] = length * units.thermal_energy(temperature)
+        if "persistence_length" not in properties:
+            del properties["temperature"]
     if preset is None:
         entries.require("diameter", "segment_length")
         return FilamentType(**properties)

@@ -48,6 +48,7 @@ CHANGES = {
     "link": ("stiffness", "rest_length", "maximum_extension", "active"),
     "joint": ("stiffness", "angle", "active"),
     "tether": ("point", "stiffness", "velocity", "start_time", "active"),
+    "end_frame": ("torque", "angular_velocity"),
     "pull": ("tension", "direction", "node", "force", "active"),
     "contacts": ("diameter", "stiffness", "excluded_neighbors", "active"),
     "wall": (

@@ -1,0 +1,145 @@
+"""Filaments with twist in files of runs: their types, frames at their ends, `twist.csv`, stages, and resuming."""
+
+import numpy as np
+import pytest
+
+from openmm_cylchain import DSDNA, analysis
+from openmm_cylchain.cli import main
+from openmm_cylchain.runs import run as run_module
+from openmm_cylchain.runs.configuration import parse_configuration
+from openmm_cylchain.runs.keys import ConfigurationError
+from openmm_cylchain.units.quantities import thermal_energy
+
+WOUND = """
+title = "wound and held"
+[solvent]
+temperature = "298 K"
+viscosity = "1 mPa s"
+[[filament]]
+type = "DSDNA"
+segment_length = "5 nm"
+twist_persistence_length = "100 nm"
+count = 2
+segments = 20
+start = "straight"
+direction = [0, 0, 1]
+clamped = [0, 1]
+[[end_frame]]
+table = 1
+end = "minus"
+direction = [0, 0, 1]
+[[end_frame]]
+table = 1
+end = "plus"
+direction = [0, 0, 1]
+angular_velocity = "3.141592653589793 1/us"
+[[pull]]
+table = 1
+node = -1
+force = ["0 pN", "0 pN", "40 pN"]
+[[pull]]
+table = 1
+node = -2
+force = ["0 pN", "0 pN", "-30 pN"]
+[simulation]
+time_step = "1 ns"
+report_interval = "0.05 us"
+checkpoint_interval = "0.5 us"
+seed = 3
+[[stage]]
+name = "winding"
+duration = "1 us"
+[[stage]]
+name = "held"
+duration = "1 us"
+[stage.end_frame.2]
+angular_velocity = "0 1/us"
+"""
+
+
+def _run(text, folder):
+    (folder / "input.toml").write_text(text)
+    return ["run", str(folder / "input.toml"), "--output", str(folder / "out")]
+
+
+@pytest.fixture(scope="module")
+def wound(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wound")
+    assert main(_run(WOUND, folder)) == 0
+    return folder / "out"
+
+
+def test_twist_and_torque_at_each_report(wound):
+    run = analysis.load(wound)
+    turns, torque = run.twist["twist (turns)"], run.twist["torque (pN nm)"]
+    assert turns.shape == torque.shape == (41, 2)
+    np.testing.assert_array_equal(run.twist["filament"], [[0, 1]] * 41)
+    # Half a turn in the first stage, which the second one keeps, but for the writhe.
+    np.testing.assert_allclose(turns[[0, 20]], [[0.0] * 2, [0.5] * 2], atol=0.05)
+    assert np.abs(turns[20:] - 0.5).max() < 0.06
+    # Of a chain whose twist is even; the joints at its ends differ from that, thermally.
+    rigidity = 100.0 * thermal_energy(298) / 0.602214
+    assert torque[10:].mean() == pytest.approx(2 * np.pi * rigidity * turns[10:].mean() / 100.0, rel=0.1)
+
+
+def test_a_resumed_run_is_the_same(wound, tmp_path, monkeypatch):
+    written = run_module.Recorder._write_checkpoint
+    count = 0
+
+    def stopped(recorder):
+        nonlocal count
+        checkpoint = written(recorder)
+        count += 1
+        if count == 3:
+            recorder._report()
+            raise KeyboardInterrupt
+        return checkpoint
+
+    command = _run(WOUND, tmp_path)
+    monkeypatch.setattr(run_module.Recorder, "_write_checkpoint", stopped)
+    assert main(command) == 130
+    monkeypatch.setattr(run_module.Recorder, "_write_checkpoint", written)
+    assert main([*command, "--resume"]) == 0
+    for name in ("twist.csv", "energies.csv", "trajectory.dcd"):
+        assert (tmp_path / "out" / name).read_bytes() == (wound / name).read_bytes()
+
+
+def test_a_torsional_rigidity_in_place_of_a_length():
+    def kind(*lines):
+        own = WOUND.replace('twist_persistence_length = "100 nm"', "\n".join(lines))
+        return parse_configuration(own).filaments[0].type
+
+    rigidity = 100.0 * thermal_energy(298)
+    of_length = kind('twist_persistence_length = "100 nm"')
+    assert of_length.torsional_rigidity == pytest.approx(rigidity)
+    assert of_length.bending_rigidity == DSDNA.bending_rigidity
+    assert kind('torsional_rigidity = "411 pN nm^2"').torsional_rigidity == pytest.approx(411 * 0.602214, rel=1e-5)
+    both = kind('twist_persistence_length = "100 nm"', 'persistence_length = "50 nm"')
+    assert both.torsional_rigidity == pytest.approx(rigidity)
+    assert both.bending_rigidity == pytest.approx(0.5 * rigidity)
+    elsewhere = kind('twist_persistence_length = "100 nm"', 'temperature = "149 K"')
+    assert elsewhere.torsional_rigidity == pytest.approx(0.5 * rigidity)
+    beside = kind('twist_persistence_length = "100 nm"', 'bending_rigidity = "205 pN nm^2"')
+    assert (beside.temperature, beside.torsional_rigidity) == (None, pytest.approx(rigidity))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('twist_persistence_length = "100 nm"\n', "", "number 1.*filament 0 has no twist: give its type"),
+        ('"100 nm"', '"100 nm"\ntorsional_rigidity = "411 pN nm^2"', "give either torsional_rigidity or"),
+        ('"100 nm"', '"-100 nm"', "twist_persistence_length"),
+        ('"100 nm"', '"100 nm"\nelement = "beam"', "twist"),
+        ('end = "plus"', 'end = "right"', "end"),
+        ('end = "plus"', 'end = "minus"', "has a frame already"),
+        ('"3.141592653589793 1/us"', '"1 1/us"\ntorque = "8 pN nm"', "not both"),
+        ("direction = [0, 0, 1]\nangular", "direction = [0, 0, 0]\nangular", "direction"),
+        ("seed = 3", 'seed = 3\nengine = "portable"', r"no \[\[end_frame\]\]|has no"),
+        ('angular_velocity = "0 1/us"', "active = false", "active"),
+    ],
+)
+def test_what_is_refused(old, new, message):
+    assert old in WOUND
+    with pytest.raises(ConfigurationError, match=message):
+        configuration = parse_configuration(WOUND.replace(old, new))
+        run_module.create_simulation(configuration)
