@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 from openmm import Context, OpenMMException, Platform, unit
 
+from ..couplings.capsule_contacts import as_capsule_contact_force
+from ..couplings.contact_frames import find_contacts
 from ..errors import InputError, InstabilityError
 from ..kinetics.binding_force import find_binding_force, place_linkers
 from ..output.progress import LateMessages, ProgressMessages
 from ..systems.refused_context import refusal
+from ..units.quantities import thermal_energy
 from .initial_state import box_vectors, build_system
 
 # Lengths of steps in those of the run or, where those are longer, in recommended ones; first in the cold.
@@ -17,6 +20,8 @@ _STEPS = 20
 _COLD_TEMPERATURE = 1.0
 _MOST_SHIFTS, _SHIFT = 3, 0.1
 """How often a filament is shifted that does not come apart, and how far along each axis, in diameters of contacts."""
+_LEAST_CHANCE, _MOST_ROUNDS = 3e-4, 100
+"""Of the deepest contact, or as many steps follow again; and how often."""
 _ALL_STEPS = _STEPS * (len(_COLD) + len(_WARM))
 
 
@@ -24,9 +29,9 @@ def relaxed_positions(configuration, built, say=None):
     """Positions in which a run begins: those of a BuiltSystem, or where contacts have pushed what overlapped.
 
     Linkers that begin bound near anchors are bound then, which a Context has that is made or initialised later.
-    It takes 140 steps without linkers: in the cold, in steps that grow, and then at the temperature of the solvent. A
-    filament that would have to go through another one is shifted by a tenth of a diameter, up to three times.
-    The result depends on the configuration alone.
+    It takes 140 steps without linkers: in the cold, in steps that grow, and then at the temperature of the solvent; and
+    more as long as contacts are deeper than chance allows. A filament that would have to go through another one is
+    shifted by a tenth of a diameter, up to three times. The result depends on the configuration alone.
 
     Parameters
     ----------
@@ -122,6 +127,11 @@ def _come_apart(configuration, positions, progress, begun=None, deleted=frozense
                         integrator.step(1)
                         if shift == 0:
                             progress.one_is_done()
+            integrator.setStepSize(recommended.step)
+            rounds = 0
+            while rounds < _MOST_ROUNDS and _chance_of_deepest(context, temperature) < _LEAST_CHANCE:
+                integrator.step(_STEPS)
+                rounds += 1
             return context.getState(positions=True).getPositions(asNumpy=True)
         except (InstabilityError, OpenMMException) as error:
             number = getattr(error, "filament", None)
@@ -132,6 +142,16 @@ def _come_apart(configuration, positions, progress, begun=None, deleted=frozense
                 ) from None
         positions = _shifted(positions, alone.filaments, number, configuration.contacts.diameter, settings.seed, shift)
     return positions
+
+
+def _chance_of_deepest(context, temperature):
+    # About that of one as deep among so many contacts.
+    forces = [force for force in context.getSystem().getForces() if as_capsule_contact_force(force)]
+    if temperature == 0.0 or not forces:
+        return 1.0
+    contacts = [find_contacts(force, context) for force in forces]
+    energies = np.concatenate([np.abs(0.5 * own.forces * own.gaps) for own in contacts])
+    return float(np.exp(-energies / thermal_energy(temperature)).min(initial=1.0) * max(len(energies), 1))
 
 
 def _shifted(positions, filaments, number, diameter, seed, shift):

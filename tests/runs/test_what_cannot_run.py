@@ -113,7 +113,7 @@ def test_linkers_are_bound_where_overlaps_have_come_apart(reach, found):
             begin(configuration, simulation, built)
         return
     positions = begin(configuration, simulation, built)._value
-    assert abs(positions[1, 1] - positions[4, 1]) > 30.0
+    assert np.linalg.norm(positions[1] - positions[4]) > 30.0
     table = built.filaments.in_context(simulation.context).linkers()
     assert list(table.held) == [2, 2]
     for row, x in enumerate((50.0, 150.0)):
