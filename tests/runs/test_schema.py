@@ -15,6 +15,7 @@ from openmm_cylchain.runs.schema import configuration_schema, format_schema
 from support.configurations import BEAMS, BODIES, COMING_AND_GOING, ENDS, EVERYTHING, GROWING
 from support.repository import EXAMPLES, ROOT
 from support.staged_runs import MANY_CHANGES
+from support.twisted_run import WOUND
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -60,7 +61,8 @@ def test_files_are_valid(text):
 def test_everything_has_every_table_and_the_examples_are_there():
     assert len(FILES) == 19
     # Joints are between filaments of beam elements.
-    tables = {table for text in (EVERYTHING, BEAMS, BODIES, GROWING, COMING_AND_GOING) for table in tomllib.loads(text)}
+    texts = EVERYTHING, BEAMS, BODIES, GROWING, COMING_AND_GOING, WOUND
+    tables = {table for text in texts for table in tomllib.loads(text)}
     assert all(kind.name in tables for kind in TABLES)
 
 
