@@ -41,6 +41,7 @@ CASES = [
     ("aster_in_a_cell", "aster", 60, 60, 2120, 1536),
     ("microrheology", "microrheology", 60, 60, 2179, 120 * 16),
     ("force_extension", "dna", 200, 100, 24 * 21, 24 * 20),
+    ("magnetic_tweezers", "tweezers", 200, 100, 22 * 41, 22 * 40),
 ]
 # The others are slow tests.
 AT_ONCE = (
