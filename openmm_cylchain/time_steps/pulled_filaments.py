@@ -120,6 +120,9 @@ def _of_held_nodes(filament, tethers, temperature, known):
     contour = kind.segment_length if kind.contour_per_segment is None else kind.contour_per_segment
     bending = kind.persistence_length_at(temperature) * contour / kind.segment_length
     for (first, (here, soft)), (second, (there, softer)) in pairwise(sorted(held.items(), key=lambda one: one[0])):
+        if second - first == 1:
+            # Nothing bends in between: a clamp is one.
+            continue
         distance = float(np.linalg.norm(there - here))
         length = (second - first) * contour
         compliance = (second - first) / kind.segment_stiffness + soft + softer
