@@ -32,7 +32,7 @@ static void checkTwist(const cylchain::ChainList& chains) {
         const cylchain::Chain& chain = chains.getChains()[index];
         if (!chain.twist.isPresent())
             continue;
-        const string name = chains.getName(chains.getNumber(cylchain::ChainKind::StraightSegments, index));
+        const string& name = chains.getName(chains.getNumber(cylchain::ChainKind::StraightSegments, index));
         if (chain.planar)
             throw OpenMMException("CylinderChainForce: "+name+" is planar, and cannot have twist");
         if (chain.nodeFriction > 0 || !cylchain::isAngular(chain.bending))
