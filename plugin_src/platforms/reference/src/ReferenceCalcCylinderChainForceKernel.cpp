@@ -14,6 +14,7 @@ void ReferenceCalcCylinderChainForceKernel::initialize(const System&, const Cyli
     this->chains = &chains;
     createEngines();
     vector<vector<int> > molecules;
+    molecules.reserve(chains.getList().size());
     for (int chain = 0; chain < chains.getList().size(); chain++)
         molecules.push_back(chains.getList().getParticles(chain));
     for (size_t i = 0; i < chains.getChains().size(); i++) {

@@ -13,6 +13,7 @@ ReferenceCalcCylinderChainWallForceKernel::ReferenceCalcCylinderChainWallForceKe
 void ReferenceCalcCylinderChainWallForceKernel::initialize(const System&, const WallSystem& walls) {
     this->walls = walls;
     vector<int> particles;
+    particles.reserve(walls.particles.size());
     for (const WallParticle& one : walls.particles)
         particles.push_back(one.particle);
     host->include(particles);

@@ -19,11 +19,9 @@ extern "C" void registerPlatforms() {
 extern "C" void registerKernelFactories() {
     for (int i = 0; i < Platform::getNumPlatforms(); i++) {
         Platform& platform = Platform::getPlatform(i);
-        if (dynamic_cast<ReferencePlatform*>(&platform) != NULL) {
-            ReferenceCylinderChainKernelFactory* factory = new ReferenceCylinderChainKernelFactory();
+        if (dynamic_cast<ReferencePlatform*>(&platform) != NULL)
             for (const string& kernel : getHostKernelNames())
-                platform.registerKernelFactory(kernel, factory);
-        }
+                platform.registerKernelFactory(kernel, new ReferenceCylinderChainKernelFactory());
     }
 }
 
