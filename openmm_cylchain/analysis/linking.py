@@ -32,14 +32,9 @@ def writhe(nodes: Vectors, closed: bool = True) -> float:
         For an array of another shape, or numbers that are not finite.
     """
     nodes, closed = _curve(nodes, "nodes"), true_or_false(closed, "closed")
-    start, end = _segments(nodes, closed)
-    count, total = len(start), 0.0
-    rows = max(1, _PAIRS // count)
-    for first in range(0, count, rows):
-        own = slice(first, first + rows)
-        # Neighbours lie in one plane, and have none.
-        total += float(np.sum(_gauss(start[own], end[own], start, end)))
-    return total / (4.0 * np.pi)
+    segments = _segments(nodes, closed)
+    # Neighbours lie in one plane, and add nothing.
+    return _gauss_integral(segments, segments)
 
 
 def linking_number(first: Vectors, second: Vectors) -> float:
@@ -55,13 +50,8 @@ def linking_number(first: Vectors, second: Vectors) -> float:
     InputError
         For arrays of another shape, or numbers that are not finite.
     """
-    one, other = _segments(_curve(first, "first"), True), _segments(_curve(second, "second"), True)
-    count, total = len(one[0]), 0.0
-    rows = max(1, _PAIRS // len(other[0]))
-    for begin in range(0, count, rows):
-        own = slice(begin, begin + rows)
-        total += float(np.sum(_gauss(one[0][own], one[1][own], *other)))
-    return total / (4.0 * np.pi)
+    one, other = _curve(first, "first"), _curve(second, "second")
+    return _gauss_integral(_segments(one, True), _segments(other, True))
 
 
 def _curve(nodes, name):
@@ -75,7 +65,17 @@ def _segments(nodes, closed):
     return (nodes, np.roll(nodes, -1, axis=0)) if closed else (nodes[:-1], nodes[1:])
 
 
-def _gauss(start: FloatArray, end: FloatArray, other_start: FloatArray, other_end: FloatArray) -> FloatArray:
+def _gauss_integral(one, other):
+    # Over all pairs of segments of two curves, which are given by where they begin and end; over 4 pi.
+    start, end = one
+    total, rows = 0.0, max(1, _PAIRS // len(other[0]))
+    for first in range(0, len(start), rows):
+        own = slice(first, first + rows)
+        total += float(np.sum(_solid_angles(start[own], end[own], *other)))
+    return total / (4.0 * np.pi)
+
+
+def _solid_angles(start: FloatArray, end: FloatArray, other_start: FloatArray, other_end: FloatArray) -> FloatArray:
     # The solid angle of the parallelogram that x - y covers, as that of two triangles.
     corners = [
         start[:, None] - other_start,

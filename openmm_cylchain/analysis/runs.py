@@ -393,7 +393,7 @@ class Run:
         positions = self.positions(frame)
         return [positions[nodes] for nodes in self._nodes_in(frame)]
 
-    @property
+    @cached_property
     def passing(self) -> frozenset[int]:
         """The numbers of filaments that are not there in some frame: that begin or vanish, are parts of others, or are
         not in all stages."""

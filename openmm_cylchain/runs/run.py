@@ -256,6 +256,7 @@ class Recorder:
         self._step = 0 if checkpoint is None else checkpoint.step
         self._moving = MovingTethers(stage, filaments)
         self._framed = sorted({frame.filament for frame in filaments.end_frames})
+        self._absent = [number for number, own in enumerate(filaments) if not own.takes_part]
         self._grows = any(filament.growth is not None for filament in filaments)
         self._rows = RowsOfForces(self._stages, configuration)
 
@@ -406,10 +407,9 @@ class Recorder:
 
     def _without_absent(self, positions):
         # Of a filament that is not there, all particles are in one place: that of a node that stands still.
-        absent = [number for number, own in enumerate(self._filaments) if not own.takes_part]
-        if absent:
+        if self._absent:
             positions = np.array(positions)
-        for number in absent:
+        for number in self._absent:
             nodes = self._filaments.node_indices[number]
             positions[nodes] = positions[self._filaments.control_point_indices[number]] = positions[nodes[-1]]
         return positions

@@ -73,7 +73,7 @@ def twisted_chain(filament_type: FilamentType, force: Scalar, torque: Scalar, te
         1/C_eff - 1/C = (a/(a^2 - b^2)^(1/2) - 1)/(l0 b^2).
 
     Of short segments, these are 1/(4Af - g^2)^(1/2) and 1/(4A (Af)^(1/2)) (Moroz and Nelson, Proc. Natl. Acad. Sci. USA
-    1997, 94, 14418). The error of 1 - z/L is about (1 - z/L)^2 of it.
+    1997, 94, 14418). Without torque, 1 - z/L is too large by about (1 - z/L)^2/2.
 
     Parameters
     ----------

@@ -41,6 +41,18 @@ static double findWayFromAxis(const Wall& wall, const double* r, double* outward
     return distance;
 }
 
+/** Find how far a position is from the axis of a torus, and unit vectors from there and along the circle. */
+static double findPlaceAround(const Wall& wall, const double* position, double* outward, double* aside) {
+    double r[3];
+    for (int k = 0; k < 3; k++)
+        r[k] = position[k]-wall.point[k];
+    const double* v = wall.vector;
+    const double distance = findWayFromAxis(wall, r, outward), size = sqrt(dot(v, v));
+    for (int k = 0; k < 3; k++)
+        aside[k] = (v[(k+1)%3]*outward[(k+2)%3]-v[(k+2)%3]*outward[(k+1)%3])/size;
+    return distance;
+}
+
 /** Take a vector that begins at the point of a wall to where the middle of its round face is nearest. */
 static void beginInMiddle(const Wall& wall, double* r) {
     const double* v = wall.vector;
@@ -282,12 +294,8 @@ void cylchain::addTurning(const Wall& wall, const double* position, const double
     bool hasAxis = wall.shape == WallShape::Cylinder || wall.shape == WallShape::Torus;
     if (wall.shape == WallShape::Torus) {
         // Around the tube, as of a cylinder: what the circle bends is less.
-        double r[3], outward[3];
-        for (int k = 0; k < 3; k++)
-            r[k] = position[k]-wall.point[k];
-        findWayFromAxis(wall, r, outward);
-        for (int k = 0; k < 3; k++)
-            axis[k] = wall.vector[(k+1)%3]*outward[(k+2)%3]-wall.vector[(k+2)%3]*outward[(k+1)%3];
+        double outward[3];
+        findPlaceAround(wall, position, outward, axis);
     }
     const double square = dot(axis, axis);
     // The caps of a capsule are those of a sphere: there, the gradient has a part along the axis.
@@ -302,13 +310,9 @@ void cylchain::addTurning(const Wall& wall, const double* position, const double
 
 /** Add the curvature of a torus along its circle. */
 static void addBendOfCircle(const Wall& wall, const double* position, const double* g, double* curvature) {
-    double r[3], outward[3], aside[3];
-    for (int k = 0; k < 3; k++)
-        r[k] = position[k]-wall.point[k];
-    const double size = sqrt(dot(wall.vector, wall.vector));
-    const double distance = max(findWayFromAxis(wall, r, outward), LEAST_DISTANCE*size);
-    for (int k = 0; k < 3; k++)
-        aside[k] = (wall.vector[(k+1)%3]*outward[(k+2)%3]-wall.vector[(k+2)%3]*outward[(k+1)%3])/size;
+    double outward[3], aside[3];
+    const double least = LEAST_DISTANCE*sqrt(dot(wall.vector, wall.vector));
+    const double distance = max(findPlaceAround(wall, position, outward, aside), least);
     int entry = 0;
     for (int i = 0; i < 3; i++)
         for (int k = i; k < 3; k++)
@@ -385,14 +389,11 @@ bool cylchain::passesThrough(const Wall& wall, const double* x, const double* y)
     if (wall.shape != WallShape::Torus)
         return dot(before, after) < 0;
     // Through the hole, and around all of it, there are ways to the other half of the circle, but for long ones.
-    double from[3], to[3], outward[3], other[3], square = 0;
-    for (int k = 0; k < 3; k++) {
-        from[k] = x[k]-wall.point[k];
-        to[k] = y[k]-wall.point[k];
+    double outward[3], other[3], aside[3], square = 0;
+    for (int k = 0; k < 3; k++)
         square += (y[k]-x[k])*(y[k]-x[k]);
-    }
-    findWayFromAxis(wall, from, outward);
-    findWayFromAxis(wall, to, other);
+    findPlaceAround(wall, x, outward, aside);
+    findPlaceAround(wall, y, other, aside);
     const double hole = sqrt(dot(wall.vector, wall.vector))-wall.length;
     return dot(outward, other) > 0 ? dot(before, after) < 0 : square > hole*hole;
 }

@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 
 from openmm_cylchain import DSDNA, ConstantVelocityPulling, analysis
-from openmm_cylchain.cli import main
-from openmm_cylchain.runs import run as run_module
 from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.keys import ConfigurationError
 from openmm_cylchain.runs.moving_tethers import MovingTethers
 from openmm_cylchain.runs.run import create_simulation
 from openmm_cylchain.runs.stages import stages_of
-from support.small_runs import simulated
+from support.small_runs import simulated, stop_and_resume
 
 PULLED = """
 title = "pulled"
@@ -96,34 +94,13 @@ def test_the_same_from_python(pulled):
 
 
 def test_a_resumed_run_is_the_same(pulled, tmp_path, monkeypatch):
-    written = run_module.Recorder._write_checkpoint
-    count = 0
-
-    def stopped(recorder):
-        nonlocal count
-        written(recorder)
-        count += 1
-        if count == 2:
-            recorder._report()
-            raise KeyboardInterrupt
-
     (tmp_path / "input.toml").write_text(PULLED)
     command = ["run", str(tmp_path / "input.toml"), "--output", str(tmp_path / "out")]
-    monkeypatch.setattr(run_module.Recorder, "_write_checkpoint", stopped)
-    with pytest.raises(KeyboardInterrupt):
-        raise_from(command)
-    monkeypatch.setattr(run_module.Recorder, "_write_checkpoint", written)
-    assert main([*command, "--resume"]) == 0
+    stop_and_resume(command, monkeypatch, checkpoints=2)
     for name in ("pulling.csv", "energies.csv"):
         assert (tmp_path / "out" / name).read_text() == (pulled / name).read_text()
     one, other = analysis.load(pulled), analysis.load(tmp_path / "out")
     np.testing.assert_array_equal(one.positions(-1), other.positions(-1))
-
-
-def raise_from(command):
-    # The command says that it was interrupted.
-    if main(command) == 130:
-        raise KeyboardInterrupt
 
 
 @pytest.mark.parametrize(

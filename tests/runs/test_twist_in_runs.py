@@ -5,10 +5,11 @@ import pytest
 
 from openmm_cylchain import DSDNA, analysis
 from openmm_cylchain.cli import main
-from openmm_cylchain.runs import run as run_module
 from openmm_cylchain.runs.configuration import parse_configuration
+from openmm_cylchain.runs.created_simulation import create_simulation
 from openmm_cylchain.runs.keys import ConfigurationError
 from openmm_cylchain.units.quantities import thermal_energy
+from support.small_runs import stop_and_resume
 from support.twisted_run import WOUND
 
 
@@ -38,23 +39,7 @@ def test_twist_and_torque_at_each_report(wound):
 
 
 def test_a_resumed_run_is_the_same(wound, tmp_path, monkeypatch):
-    written = run_module.Recorder._write_checkpoint
-    count = 0
-
-    def stopped(recorder):
-        nonlocal count
-        checkpoint = written(recorder)
-        count += 1
-        if count == 3:
-            recorder._report()
-            raise KeyboardInterrupt
-        return checkpoint
-
-    command = _run(WOUND, tmp_path)
-    monkeypatch.setattr(run_module.Recorder, "_write_checkpoint", stopped)
-    assert main(command) == 130
-    monkeypatch.setattr(run_module.Recorder, "_write_checkpoint", written)
-    assert main([*command, "--resume"]) == 0
+    stop_and_resume(_run(WOUND, tmp_path), monkeypatch, checkpoints=3)
     for name in ("twist.csv", "energies.csv", "trajectory.dcd"):
         assert (tmp_path / "out" / name).read_bytes() == (wound / name).read_bytes()
 
@@ -97,4 +82,4 @@ def test_what_is_refused(old, new, message):
     assert old in WOUND
     with pytest.raises(ConfigurationError, match=message):
         configuration = parse_configuration(WOUND.replace(old, new))
-        run_module.create_simulation(configuration)
+        create_simulation(configuration)

@@ -1,6 +1,7 @@
 """Configurations of runs that take a second, and their directories."""
 
 from openmm_cylchain.cli import main
+from openmm_cylchain.runs import run as run_module
 
 TWO_TYPES = """
 title = "two types"
@@ -111,3 +112,23 @@ def simulated(folder, text):
     (folder / "input.toml").write_text(text)
     assert main(["run", str(folder / "input.toml"), "--output", str(folder / "out")]) == 0
     return folder / "out"
+
+
+def stop_and_resume(command, monkeypatch, checkpoints):
+    """Run a command until so many checkpoints are written, and a report after the last one; then resume it."""
+    written = run_module.Recorder._write_checkpoint
+    count = 0
+
+    def stopped(recorder):
+        nonlocal count
+        checkpoint = written(recorder)
+        count += 1
+        if count == checkpoints:
+            recorder._report()
+            raise KeyboardInterrupt
+        return checkpoint
+
+    with monkeypatch.context() as patch:
+        patch.setattr(run_module.Recorder, "_write_checkpoint", stopped)
+        assert main(command) == 130
+    assert main([*command, "--resume"]) == 0
