@@ -17,53 +17,29 @@ void CapsulePairs::clear() {
     pairs.clear();
     watches.clear();
     slots.clear();
-    lastAdded.clear();
-    addedBefore.clear();
 }
 
 void CapsulePairs::begin(vector<ContactPair>& found, int numCapsules) {
-    pairs.swap(found);
-    firstPairs.assign(numCapsules+1, 0);
+    pairs.begin(found, numCapsules);
     watches.clear();
-    seconds.clear();
-    for (const ContactPair& pair : pairs) {
-        firstPairs[pair.a+1]++;
-        seconds.push_back(pair.b);
-        watches.push_back({pair.a, pair.b, -HUGE_VAL, 0, -1, pair.clearance});
-    }
-    for (int i = 0; i < numCapsules; i++)
-        firstPairs[i+1] += firstPairs[i];
-    slots.assign(pairs.size(), -1);
+    slots.clear();
     for (vector<Contacts>& ofChunk : contacts)
         ofChunk.clear();
-    makeChunks();
-    lastAdded.assign(numCapsules, -1);
-    addedBefore.clear();
-}
-
-bool CapsulePairs::isKnown(int a, int b) const {
-    if (binary_search(seconds.begin()+firstPairs[a], seconds.begin()+firstPairs[a+1], b))
-        return true;
-    const int numFirst = firstPairs.back();
-    for (int i = lastAdded[a]; i >= 0; i = addedBefore[i-numFirst])
-        if (watches[i].b == b)
-            return true;
-    return false;
+    watchNew();
 }
 
 void CapsulePairs::add(const ContactPair& pair) {
-    if (isKnown(pair.a, pair.b))
-        return;
-    addedBefore.push_back(lastAdded[pair.a]);
-    lastAdded[pair.a] = pairs.size();
-    pairs.push_back(pair);
-    watches.push_back({pair.a, pair.b, -HUGE_VAL, 0, -1, pair.clearance});
-    slots.push_back(-1);
-    makeChunks();
+    pairs.add(pair);
+    watchNew();
 }
 
-/** Chunks keep their memory from step to step. */
-void CapsulePairs::makeChunks() {
+void CapsulePairs::watchNew() {
+    for (int i = watches.size(); i < pairs.size(); i++) {
+        const ContactPair& pair = pairs.get(i);
+        watches.push_back({pair.a, pair.b, -HUGE_VAL, 0, -1, pair.clearance});
+    }
+    slots.resize(pairs.size(), -1);
+    // Chunks keep their memory from step to step.
     if ((int) contacts.size() < getNumChunks())
         contacts.resize(getNumChunks());
 }
@@ -80,7 +56,7 @@ void CapsulePairs::updateGaps(int number) {
         Contact& contact = getContact(number, i).contact;
         const Vec3d r = getSegments(number, true).between(contact.s, contact.t);
         const double* n = contact.normal;
-        contact.gap = r.x*n[0]+r.y*n[1]+r.z*n[2]-radiiOf(pairs[number]);
+        contact.gap = r.x*n[0]+r.y*n[1]+r.z*n[2]-radiiOf(pairs.get(number));
     }
 }
 

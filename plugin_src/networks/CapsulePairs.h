@@ -3,6 +3,7 @@
 
 #include "couplings/ContactSearch.h"
 #include "networks/ContactRest.h"
+#include "networks/PairList.h"
 #include <vector>
 
 namespace cylchain {
@@ -42,11 +43,11 @@ public:
         search = newSearch;
     }
     void clear();
-    /** Take over the pairs that a search of all capsules has found, in its order. */
+    /** See PairList. */
     void begin(std::vector<ContactPair>& found, int numCapsules);
-    /** Get whether a pair is there. The number of a is less than that of b. */
-    bool isKnown(int a, int b) const;
-    /** Add a pair that another search has found, if it is not there. */
+    bool isKnown(int a, int b) const {
+        return pairs.isKnown(a, b);
+    }
     void add(const ContactPair& pair);
     int getNumPairs() const {
         return pairs.size();
@@ -55,7 +56,7 @@ public:
         return (getNumPairs()+CHUNK-1)/CHUNK;
     }
     const ContactPair& getPair(int number) const {
-        return pairs[number];
+        return pairs.get(number);
     }
     /** Get the sum of the radii of a pair. */
     double radiiOf(const ContactPair& pair) const {
@@ -87,22 +88,17 @@ public:
     void placeContacts(int number, const Contact* found, int count);
     /** Get the axes of a pair at the beginning of the step, or where an iteration has led them. */
     SegmentPair getSegments(int number, bool atEnd) const {
-        return search->getSegments(pairs[number], atEnd);
+        return search->getSegments(pairs.get(number), atEnd);
     }
 private:
-    void makeChunks();
+    void watchNew();
     /** The contacts of a pair. */
     struct Contacts {
         PairContact of[2];
     };
     const ContactSearch* search = nullptr;
-    /** Those of the first search in its order, and behind them those that others have found. */
-    std::vector<ContactPair> pairs;
+    PairList pairs;
     std::vector<Watch> watches;
-    /** The second capsules of those of the first search, and where they begin for each first capsule. */
-    std::vector<int> seconds, firstPairs;
-    /** The last pair of each first capsule that another search has found, or -1, and the one before each of these. */
-    std::vector<int> lastAdded, addedBefore;
     /** Where the contacts of each pair are among those of its chunk, or -1: most pairs never come near. */
     std::vector<int> slots;
     std::vector<std::vector<Contacts> > contacts;

@@ -240,14 +240,11 @@ bool ContactEquations::anyCross() {
 void ContactEquations::findFailures(const double* moved, vector<bool>& failed) {
     if (clear)
         return;
-    for (size_t i = 0; movesTooFar && i < places.size(); i++)
-        if (places[i].place.pack >= 0)
-            failed[places[i].place.chain] = true;
+    if (movesTooFar)
+        places.failAll(failed);
     for (int i = 0; i < pairs.getNumPairs(); i++)
         if (search->crosses(pairs.getPair(i), begun, moved))
-            for (int capsule : {pairs.getPair(i).a, pairs.getPair(i).b})
-                if (places[capsule].place.pack >= 0)
-                    failed[places[capsule].place.chain] = true;
+            places.fail(pairs.getPair(i), failed);
 }
 
 bool ContactEquations::findCulprit(const double* moved, const CouplingEquation* equations,
@@ -256,15 +253,13 @@ bool ContactEquations::findCulprit(const double* moved, const CouplingEquation* 
     if (isEndless)
         return false;
     if (movesTooFar) {
-        culprit.reason = BrokenCoupling::LeavesBox;
-        culprit.places[0] = describePlace(places[findFastest(search->getSystem().capsules, begun, moved)].place);
+        places.nameFastest(search->getSystem().capsules, begun, moved, culprit);
         return true;
     }
     for (int i = 0; i < pairs.getNumPairs(); i++)
         if (search->crosses(pairs.getPair(i), begun, moved)) {
             culprit.reason = BrokenCoupling::Crosses;
-            culprit.places[0] = describePlace(places[pairs.getPair(i).a].place);
-            culprit.places[1] = describePlace(places[pairs.getPair(i).b].place);
+            places.name(pairs.getPair(i), culprit);
             return true;
         }
     if (unsettled < 0)
@@ -275,9 +270,6 @@ bool ContactEquations::findCulprit(const double* moved, const CouplingEquation* 
 }
 
 void ContactEquations::findNeighbours(vector<pair<int, int> >& neighbours) const {
-    for (int i = 0; i < pairs.getNumPairs(); i++) {
-        const PlaceOnChain &a = places[pairs.getPair(i).a].place, &b = places[pairs.getPair(i).b].place;
-        if (a.pack >= 0 && b.pack >= 0)
-            neighbours.push_back(make_pair(a.chain, b.chain));
-    }
+    for (int i = 0; i < pairs.getNumPairs(); i++)
+        places.addNeighbours(pairs.getPair(i), neighbours);
 }

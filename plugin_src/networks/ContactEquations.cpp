@@ -60,40 +60,19 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     wallDepth = findDepthOfWall(kT, stiffness);
     responses.begin(start.places, stepSize);
     const vector<Capsule>& capsules = search->getSystem().capsules;
-    places.resize(capsules.size());
+    places.begin(start, capsules, *onCurves, *loop);
     packs.resize(capsules.size());
+    mobilities.resize(capsules.size());
     double diameter = 0;
     for (const Capsule& capsule : capsules)
         diameter = max(diameter, 2*capsule.radius);
-    auto note = [&] (int i) {
-        const PlaceOnChain& place = places[i].place;
-        packs[i] = place.pack;
-        places[i].leastResponse = place.pack < 0 ? 0 : responses.findLeast(place.chain);
-        places[i].friction = place.pack < 0 ? LateralFriction() : start.places.findLateralFriction(place);
-    };
     runInChunks(*loop, capsules.size(), CHUNK_OF_CONTACTS, [&] (int i) {
-        const Capsule& capsule = capsules[i];
-        Place place;
-        place.first = capsule.first;
-        place.second = capsule.second;
-        PlaceOnChain& found = places[i].place;
-        places[i].direction = 0;
-        if (start.places.find(place, found) && start.taken[found.chain])
-            places[i].direction = capsule.second < 0 ? 0 : found.fraction == 0 ? 1 : -1;
-        else
-            found = PlaceOnChain();
-        note(i);
+        const PlaceOnChain& place = places.get(i);
+        packs[i] = place.pack;
+        mobilities[i] = {};
+        if (place.pack >= 0)
+            mobilities[i] = {responses.findLeast(place.chain), start.places.findLateralFriction(place)};
     });
-    for (const CapsuleOnCurve& own : *onCurves) {
-        PlaceOnChain& found = places[own.capsule].place;
-        if (start.places.find(own.first, found) && start.taken[found.chain]) {
-            found.hold.pieces = own.pieces;
-            places[own.capsule].direction = (own.forwards ? 1.0 : -1.0)/own.pieces;
-        }
-        else
-            found = PlaceOnChain();
-        note(own.capsule);
-    }
     reaches[0] = REACH*diameter;
     reaches[1] = LEAST_REACH*diameter;
     movesTooFar = isEndless = false;
@@ -109,12 +88,6 @@ double ContactEquations::getRelativeTolerance() const {
 
 void ContactEquations::beginStage(int, int, const double*) {
     iterations = 0;
-}
-
-PlaceOnChain ContactEquations::placeOf(int capsule, double fraction) const {
-    PlaceOnChain place = places[capsule].place;
-    place.fraction += places[capsule].direction*fraction;
-    return place;
 }
 
 void ContactEquations::findPairs(const double* moved) {
@@ -146,8 +119,7 @@ void ContactEquations::findPairs(const double* moved) {
 
 /** How far a unit force across a capsule moves a place on it in the step. */
 double ContactEquations::responseOf(int capsule, double fraction) const {
-    const PlaceOnChain place = placeOf(capsule, fraction);
-    return place.pack < 0 ? 0 : responses.find(place, places[capsule].friction);
+    return places.isHeld(capsule) ? 0 : responses.find(places.get(capsule, fraction), mobilities[capsule].friction);
 }
 
 /** a of a contact, see ContactRest. */
@@ -210,7 +182,7 @@ void ContactEquations::look(int run, bool first, Part& part) {
             prefetch(&pairs.getContact(i, 0));
         search->prefetchMotion(watch.a, watch.b);
         for (int capsule : {watch.a, watch.b})
-            prefetch(&places[capsule]);
+            places.prefetchPlace(capsule);
         looks.numbers.push_back(isDue ? i : -1-i);
         if (isDue)
             looks.due.push_back(&pairs.getPair(i));
@@ -261,7 +233,7 @@ void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlo
         PairContact& side = pairs.getContact(number, i);
         Contact& contact = side.contact;
         if (!side.rest.isKnown()) {
-            double softness = stiffness*(places[pair.a].leastResponse+places[pair.b].leastResponse);
+            double softness = stiffness*(mobilities[pair.a].least+mobilities[pair.b].least);
             if (softness < 1)
                 softness = softnessOf(pair, contact);
             side.rest = ContactRest(softness, first ? max(contact.gap, -LARGEST_RETURN*diameter) : 0);
@@ -308,8 +280,8 @@ bool ContactEquations::addEquation(int number, int which, Part& part) {
     if (!side.touched)
         return false;
     CouplingEquation equation;
-    equation.places[0] = placeOf(pair.a, contact.s);
-    equation.places[1] = placeOf(pair.b, contact.t);
+    equation.places[0] = places.get(pair.a, contact.s);
+    equation.places[1] = places.get(pair.b, contact.t);
     const double own = contact.weight*stiffness;
     if (side.rest.isBack()) {
         const Vec3d now = pairs.getSegments(number, true).between(contact.s, contact.t);
@@ -375,8 +347,8 @@ void ContactEquations::findPushes(const double*, vector<Push>& pushes) const {
                 copy_n(n, 3, force);
             }
             pushes.push_back(pushOfContact(search->getSystem(), pair.a, pair.b, s, t, size, force));
-            pushes.back().chains[0] = places[pair.a].place.chain;
-            pushes.back().chains[1] = places[pair.b].place.chain;
+            pushes.back().chains[0] = places.get(pair.a).chain;
+            pushes.back().chains[1] = places.get(pair.b).chain;
         }
     }
 }

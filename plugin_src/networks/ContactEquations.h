@@ -4,7 +4,7 @@
 #include "couplings/ContactSearch.h"
 #include "networks/CapsuleMotion.h"
 #include "networks/CapsulePairs.h"
-#include "networks/CurveSites.h"
+#include "networks/CapsulePlaces.h"
 #include "networks/ImplicitCouplings.h"
 #include "networks/PairSelection.h"
 #include "networks/PlaceResponses.h"
@@ -59,13 +59,9 @@ public:
     void findPushes(const double* moved, std::vector<Push>& pushes) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& neighbours) const override;
 private:
-    /**
-     * Where a capsule is: its place at fraction 0, by how much the fraction grows along it, and what is needed to find
-     * how places on it respond to forces, with the least of these responses.
-     */
-    struct CapsulePlace {
-        PlaceOnChain place;
-        double direction, leastResponse;
+    /** What is needed to find how places on a capsule respond to forces, and the least of these responses. */
+    struct Mobility {
+        double least = 0;
         LateralFriction friction;
     };
     struct Part {
@@ -111,7 +107,6 @@ private:
     void findNear(int firstNew, int run, Part& part);
     bool anyCross();
     void findCrossed(bool all, int run, Part& part) const;
-    PlaceOnChain placeOf(int capsule, double fraction) const;
     ContactSearch* search = nullptr;
     double stiffness = 0;
     const Loop* loop = nullptr;
@@ -120,9 +115,10 @@ private:
     const std::vector<CapsuleOnCurve>* onCurves = nullptr;
     PlaceResponses responses;
     double kT = 0, stepSize = 0, wallDepth = 0, reach = 0, reaches[2] = {};
-    std::vector<CapsulePlace> places;
+    CapsulePlaces places;
     /** The packs of these places. */
     std::vector<int> packs;
+    std::vector<Mobility> mobilities;
     CapsulePairs pairs;
     /** Those of the last search. */
     std::vector<ContactPair> found;

@@ -10,10 +10,6 @@ using namespace std;
 
 namespace {
 
-/** How much farther than needed pairs are looked for, over the diameter: further iterations move them. */
-const double SLACK = 0.25;
-/** Parts of all this that pairs are looked for in where a periodic box is too narrow for more. */
-const double NARROWER[] = {1, 0.6, 0.35, 0.2};
 /** Capsules that have travelled less, over the sum of the radii, touch where they did. */
 const double SAME_TOUCH = 0.01;
 /** The number of iterations in which places and normals move. */
@@ -21,9 +17,7 @@ const int MOVING_ITERATIONS = 3;
 /** How often a gap is found again when all has converged, and from which thermal change of it on. */
 const int MOST_TIMES_AGAIN = 4;
 const double LARGEST_CHANGE = 1;
-/** The largest depth of a hard surface, over the sum of the radii: it is before the axes. */
-const double LARGEST_DEPTH = 0.95;
-/** Capsules or pairs that a thread looks at together. */
+/** Capsules, or gaps, that a thread looks at together. */
 const int CHUNK_OF_CAPSULES = 256;
 
 Vec3d gradientOf(const Contact& contact) {
@@ -75,7 +69,7 @@ void ContactGaps::setContacts(const ContactSystem& contacts) {
     sites = contacts.sites;
     search = contacts.search;
     stiffness = contacts.stiffness;
-    box = contacts.box;
+    candidates.setSearch(search, stiffness, contacts.box);
     impulses = contacts.impulses;
 }
 
@@ -108,204 +102,16 @@ void ContactGaps::begin(const CoupledStart& start, const Loop& newLoop) {
     kT = start.settings.kT;
     responses.begin(start.places, start.settings.stepSize);
     const vector<Capsule>& capsules = search->getSystem().capsules;
-    places.resize(capsules.size());
-    auto note = [&] (int i, double direction) {
-        CapsulePlace& own = places[i];
-        own.direction = direction;
-        own.response = 0;
-        for (double fraction : {0, 1})
-            if (own.place.pack >= 0)
-                own.response = max(own.response, GAP_RESPONSE_MARGIN*responses.find(placeOf(i, fraction)));
-    };
+    places.begin(start, capsules, *onCurves, newLoop);
+    responsesOfCapsules.resize(capsules.size());
     runInChunks(*loop, capsules.size(), CHUNK_OF_CAPSULES, [&] (int i) {
-        const Capsule& capsule = capsules[i];
-        Place place;
-        place.first = capsule.first;
-        place.second = capsule.second;
-        PlaceOnChain& found = places[i].place;
-        double direction = 0;
-        if (start.places.find(place, found) && start.taken[found.chain])
-            direction = capsule.second < 0 ? 0 : found.fraction == 0 ? 1 : -1;
-        else
-            found = PlaceOnChain();
-        note(i, direction);
+        double& largest = responsesOfCapsules[i] = 0;
+        for (double fraction : {0, 1})
+            if (!places.isHeld(i))
+                largest = max(largest, GAP_RESPONSE_MARGIN*responses.find(places.get(i, fraction)));
     });
-    for (const CapsuleOnCurve& own : *onCurves) {
-        PlaceOnChain& found = places[own.capsule].place;
-        double direction = 0;
-        if (start.places.find(own.first, found) && start.taken[found.chain]) {
-            found.hold.pieces = own.pieces;
-            direction = (own.forwards ? 1.0 : -1.0)/own.pieces;
-        }
-        else
-            found = PlaceOnChain();
-        note(own.capsule, direction);
-    }
-    double diameter = 0, response = 0;
-    for (size_t i = 0; i < capsules.size(); i++) {
-        diameter = max(diameter, 2*capsules[i].radius);
-        response = max(response, 2*places[i].response);
-    }
-    reach = sqrt(LARGEST_GAP_EXPONENT*kT*response);
-    slack = SLACK*diameter;
-    movesTooFar = isEndless = false;
-    pairs.clear();
-    rooms.clear();
-    surfaces.clear();
+    candidates.begin(start, places, responsesOfCapsules, newLoop);
     near.clear();
-    motion.clear();
-}
-
-PlaceOnChain ContactGaps::placeOf(int capsule, double fraction) const {
-    PlaceOnChain place = places[capsule].place;
-    place.fraction += places[capsule].direction*fraction;
-    return place;
-}
-
-/** Look for pairs of all capsules that are not known, as far as the periodic box is wide enough. */
-void ContactGaps::findPairs(const double* moved, const PairFilter& known) {
-    movesTooFar = true;
-    for (double part : NARROWER)
-        try {
-            search->findPairs(begun, moved, box, part*(reach+slack), found, *loop, known);
-            movesTooFar = false;
-            return;
-        }
-        catch (const NarrowBoxError&) {
-            found.clear();
-        }
-        catch (const EndlessMotionError&) {
-            found.clear();
-            isEndless = true;
-            return;
-        }
-}
-
-/** Look for pairs of capsules that have moved far, which no search has seen. */
-void ContactGaps::findNewPairs(const double* moved) {
-    const PairFilter known = [&] (int a, int b) {
-        return pairs.isKnown(a, b);
-    };
-    try {
-        search->findPairsOf(motion.getMovers(), begun, moved, found, *loop, known);
-    }
-    catch (const NarrowBoxError&) {
-        findPairs(moved, known);
-    }
-    catch (const EndlessMotionError&) {
-        movesTooFar = isEndless = true;
-    }
-    motion.beginAgain(motion.getMovers(), moved);
-    for (const ContactPair& pair : found)
-        pairs.add(pair);
-}
-
-/**
- * Get whether the gap of a pair may be closed that begins and ends so; if not, how far its capsules may travel until it
- * may.
- */
-bool ContactGaps::mayClose(int number, double before, double after, double& room) const {
-    const ContactPair& pair = pairs.get(number);
-    const double least = LARGEST_GAP_EXPONENT*kT*(places[pair.a].response+places[pair.b].response);
-    auto isFar = [&] (double depth) {
-        const double start = before+depth;
-        room = after+depth-least/start;
-        return start > 0 && room > 0;
-    };
-    if (isFar(0))
-        return false;
-    Gap gap;
-    gap.stiffness = stiffness;
-    const double depth = placeHardSurface(number, before, gap);
-    return gap.law != GapLaw::Reflection || !isFar(depth);
-}
-
-double ContactGaps::placeHardSurface(int number, double begun, Gap& gap) const {
-    const double deepest = LARGEST_DEPTH*radiiOf(pairs.get(number));
-    return cylchain::placeHardSurface(kT, all->getNoise().getLimit(), surfaces[number], deepest, begun, gap);
-}
-
-/** Pairs that are looked at together, in memory of a thread. */
-struct ContactGaps::Looks {
-    vector<const ContactPair*> pairs;
-    vector<int> numbers;
-    vector<PairOutlook> outlooks;
-    static Looks& ofThread() {
-        static thread_local Looks memory;
-        memory.pairs.clear();
-        memory.numbers.clear();
-        return memory;
-    }
-    void add(int number, const ContactPair& pair) {
-        pairs.push_back(&pair);
-        numbers.push_back(number);
-    }
-    void look(const ContactSearch& search) {
-        outlooks.resize(pairs.size());
-        search.findOutlooks(pairs.data(), pairs.size(), outlooks.data());
-    }
-};
-
-/** Draw what the hard surfaces of some pairs are found with. */
-void ContactGaps::drawSurfaces(int first, int last) {
-    if (first >= last)
-        return;
-    static thread_local vector<uint32_t> keys, others;
-    keys.clear();
-    others.clear();
-    for (int i = first; i < last; i++) {
-        keys.push_back(keyOf(pairs.get(i)));
-        others.push_back(pairs.get(i).b);
-    }
-    all->getNoise().drawSurfaces(keys.data(), others.data(), last-first, &surfaces[first]);
-}
-
-/** Find the pairs from a number on, or those that have travelled far enough, whose gaps may be closed. */
-void ContactGaps::selectNear(int firstNew) {
-    const int count = pairs.size(), chunks = (count+CHUNK_OF_CAPSULES-1)/CHUNK_OF_CAPSULES;
-    rooms.resize(count, 0.0);
-    surfaces.resize(count);
-    parts.resize(max(parts.size(), (size_t) chunks));
-    (*loop)(chunks, [&] (int chunk) {
-        Looks& looks = Looks::ofThread();
-        const int first = chunk*CHUNK_OF_CAPSULES, last = min(count, first+CHUNK_OF_CAPSULES);
-        drawSurfaces(max(first, firstNew), last);
-        for (int i = first; i < last; i++) {
-            const ContactPair& pair = pairs.get(i);
-            const double way = motion.getWay(pair.a, pair.b), radii = radiiOf(pair);
-            double room;
-            if (rooms[i] < 0 || (i < firstNew && way < rooms[i]))
-                continue;
-            if (isHeld(pair))
-                rooms[i] = HUGE_VAL;
-            else if (i >= firstNew && pair.clearance > 0 && !mayClose(i, pair.before-radii, pair.distance-radii, room))
-                rooms[i] = way+min(room, (double) pair.clearance);
-            else
-                looks.add(i, pair);
-        }
-        looks.look(*search);
-        vector<int>& own = parts[chunk].pairs;
-        own.clear();
-        for (size_t k = 0; k < looks.pairs.size(); k++) {
-            const ContactPair& pair = *looks.pairs[k];
-            const PairOutlook& outlook = looks.outlooks[k];
-            double before = pair.before-outlook.radii, room;
-            // The surface of what overlaps is as deep as it does: that must be exact, as the end is.
-            if (before < 0)
-                before = sqrt(findNearestPoints(search->getSegments(pair, false)).squared)-outlook.radii;
-            if (mayClose(looks.numbers[k], before, outlook.gap, room) ||
-                    (outlook.mayCross && search->crosses(pair)))
-                own.push_back(looks.numbers[k]);
-            else
-                rooms[looks.numbers[k]] = motion.getWay(pair.a, pair.b)+room;
-        }
-    });
-    for (int chunk = 0; chunk < chunks; chunk++)
-        for (int i : parts[chunk].pairs) {
-            rooms[i] = -1;
-            near.emplace_back();
-            near.back().pair = i;
-        }
 }
 
 /**
@@ -344,7 +150,7 @@ int ContactGaps::findContactsBeside(const ContactPair& pair, ContactPair& last, 
 
 /** The pair that a lever of a gap holds apart. */
 ContactPair ContactGaps::pairOfLever(const NearPair& own, int lever) const {
-    ContactPair result = pairs.get(own.pair);
+    ContactPair result = candidates.get(own.pair);
     if (lever >= own.start.count) {
         result.a = own.last[0];
         result.b = own.last[1];
@@ -358,8 +164,8 @@ ContactPair ContactGaps::pairOfLever(const NearPair& own, int lever) const {
  * @param again  whether the gap is found in any case
  */
 void ContactGaps::follow(NearPair& own, bool again) const {
-    const ContactPair& pair = pairs.get(own.pair);
-    const double way = motion.getWay(pair.a, pair.b), radii = radiiOf(pair);
+    const ContactPair& pair = candidates.get(own.pair);
+    const double way = candidates.getWay(own.pair), radii = candidates.radiiOf(own.pair);
     const bool isNew = own.way < 0;
     const bool mayMove = own.number < 0 || iterations <= MOVING_ITERATIONS;
     own.hasMoved = isNew || again || (mayMove && way-own.way > SAME_TOUCH*radii);
@@ -374,11 +180,9 @@ void ContactGaps::follow(NearPair& own, bool again) const {
         const int count = search->evaluate(pair, begun, begun, contacts);
         own.touchedAtStart = count > 0;
         own.start = findPairGap(search->getSegments(pair, false), contacts, count, radii);
-        own.gap.key[0] = keyOf(pair);
-        own.gap.key[1] = pair.b;
         own.gap.stiffness = stiffness;
-        own.gap.response = places[pair.a].response+places[pair.b].response;
-        own.depth = placeHardSurface(own.pair, own.start.gap, own.gap);
+        own.gap.response = responsesOfCapsules[pair.a]+responsesOfCapsules[pair.b];
+        own.depth = candidates.placeHardSurface(own.pair, own.start.gap, own.gap);
     }
     int count = search->evaluate(pair, contacts);
     // What touches a neighbor at the start and at the end is no gap of this pair.
@@ -394,8 +198,8 @@ void ContactGaps::follow(NearPair& own, bool again) const {
         for (int i = 0; i < of->count; i++) {
             GapLever& lever = own.gap.levers[own.gap.numLevers];
             const ContactPair& touching = of == &end ? last : pair;
-            lever.places[0] = placeOf(touching.a, of->s[i]);
-            lever.places[1] = placeOf(touching.b, of->t[i]);
+            lever.places[0] = places.get(touching.a, of->s[i]);
+            lever.places[1] = places.get(touching.b, of->t[i]);
             lever.gradient[0] = 0.5*of->gradients[i].x;
             lever.gradient[1] = 0.5*of->gradients[i].y;
             lever.gradient[2] = 0.5*of->gradients[i].z;
@@ -432,38 +236,22 @@ bool ContactGaps::isOfNeighbor(const NearPair& own, const vector<const NearPair*
     auto areNeighbors = [&] (int a, int b) {
         return a == b || capsules[a].first == capsules[b].second || capsules[a].second == capsules[b].first;
     };
-    const ContactPair& pair = pairs.get(own.pair);
+    const ContactPair& pair = candidates.get(own.pair);
     return !own.touchedAtStart && any_of(deep.begin(), deep.end(), [&] (const NearPair* other) {
-        const ContactPair& deeper = pairs.get(other->pair);
+        const ContactPair& deeper = candidates.get(other->pair);
         return areNeighbors(pair.a, deeper.a) && areNeighbors(pair.b, deeper.b);
     });
 }
 
 bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, ReflectedGaps& gaps) {
-    crossedAreKnown = false;
-    if (movesTooFar)
-        return false;
     all = &gaps;
     iterations = iteration;
-    int firstNew = 0;
-    if (!motion.hasBegun()) {
-        findPairs(moved, PairFilter());
-        motion.begin(search->getSystem().capsules, moved, *loop);
-        pairs.begin(found, places.size());
-        search->setMotion(begun, moved, *loop);
-    }
-    else {
-        motion.follow([] (int) {return true;}, moved, slack, *loop, [&] (const vector<int>& capsules) {
-            search->updateMotion(capsules, moved);
-        });
-        firstNew = pairs.size();
-        // While much moves, it may come back.
-        if (motion.exceedsReach() && settled)
-            findNewPairs(moved);
-    }
-    if (movesTooFar)
+    if (!candidates.follow(settled, moved, gaps.getNoise()))
         return false;
-    selectNear(firstNew);
+    for (int pair : candidates.getNew()) {
+        near.emplace_back();
+        near.back().pair = pair;
+    }
     runInChunks(*loop, near.size(), CHUNK_OF_CAPSULES, [&] (int i) {
         follow(near[i]);
         if (near[i].number < 0)
@@ -481,21 +269,20 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
         if (own.number < 0 && own.hasMoved && own.gap.numLevers > 0 && own.gap.present && mayClose(own.gap) &&
                 !isOfNeighbor(own, deep))
             own.number = gaps.add(own.gap);
-    return motion.exceedsReach() && !settled;
+    return candidates.mayLackPairs() && !settled;
 }
 
 bool ContactGaps::followAgain(ReflectedGaps& gaps) {
-    findCrossed();
+    const vector<int>& crossed = candidates.getCrossed();
     const double largest = LARGEST_CHANGE*sqrt(kT/stiffness);
     runInChunks(*loop, near.size(), CHUNK_OF_CAPSULES, [&] (int i) {
         NearPair& own = near[i];
         own.hasMoved = false;
         if (own.number < 0 || own.timesAgain == MOST_TIMES_AGAIN)
             return;
-        const ContactPair& pair = pairs.get(own.pair);
         const bool hasCrossed = binary_search(crossed.begin(), crossed.end(), own.pair);
         // Neither the gap nor what its places make of it has changed by more than this way.
-        if (!hasCrossed && !(2*(motion.getWay(pair.a, pair.b)-own.way) > largest))
+        if (!hasCrossed && !(2*(candidates.getWay(own.pair)-own.way) > largest))
             return;
         NearPair again = own;
         again.timesAgain++;
@@ -514,75 +301,27 @@ bool ContactGaps::followAgain(ReflectedGaps& gaps) {
 }
 
 void ContactGaps::findFailures(const double*, vector<bool>& failed) {
-    if (movesTooFar)
-        for (const CapsulePlace& own : places)
-            if (own.place.pack >= 0)
-                failed[own.place.chain] = true;
-    if (!crossedAreKnown)
-        findCrossed();
-    for (int i : crossed)
-        for (int capsule : {pairs.get(i).a, pairs.get(i).b})
-            if (places[capsule].place.pack >= 0)
-                failed[places[capsule].place.chain] = true;
-}
-
-/** Find pairs that have passed through each other, although their gaps do not see it, or they have none. */
-void ContactGaps::findCrossed() {
-    crossed.clear();
-    crossedAreKnown = true;
-    if (movesTooFar)
-        return;
-    const int count = pairs.size(), chunks = (count+CHUNK_OF_CAPSULES-1)/CHUNK_OF_CAPSULES;
-    (*loop)(chunks, [&] (int chunk) {
-        Looks& looks = Looks::ofThread();
-        for (int i = chunk*CHUNK_OF_CAPSULES; i < min(count, (chunk+1)*CHUNK_OF_CAPSULES); i++) {
-            const ContactPair& pair = pairs.get(i);
-            if (!isHeld(pair) && !(motion.getWay(pair.a, pair.b) < pair.clearance))
-                looks.add(i, pair);
-        }
-        looks.look(*search);
-        vector<int>& own = parts[chunk].pairs;
-        own.clear();
-        for (size_t k = 0; k < looks.pairs.size(); k++)
-            if (looks.outlooks[k].mayCross && search->crosses(*looks.pairs[k]))
-                own.push_back(looks.numbers[k]);
-    });
-    for (int chunk = 0; chunk < chunks; chunk++)
-        crossed.insert(crossed.end(), parts[chunk].pairs.begin(), parts[chunk].pairs.end());
+    if (candidates.movesTooFar())
+        places.failAll(failed);
+    for (int pair : candidates.getCrossed())
+        places.fail(candidates.get(pair), failed);
 }
 
 bool ContactGaps::findCulprit(const double* moved, const CouplingEquation*, BrokenCoupling& culprit) const {
-    // The chain itself is known.
-    if (isEndless)
-        return false;
-    auto name = [&] (int number) {
-        culprit.places[0] = describePlace(places[pairs.get(number).a].place);
-        culprit.places[1] = describePlace(places[pairs.get(number).b].place);
-    };
-    if (movesTooFar) {
-        culprit.reason = BrokenCoupling::LeavesBox;
-        culprit.places[0] = describePlace(places[findFastest(search->getSystem().capsules, begun, moved)].place);
-        return true;
-    }
-    if (!crossed.empty()) {
-        culprit.reason = BrokenCoupling::Crosses;
-        name(crossed[0]);
-        return true;
-    }
+    const bool known = candidates.findCulprit(moved, culprit);
+    if (known || candidates.movesTooFar())
+        return known;
     for (const NearPair& own : near)
         if (own.number >= 0 && all->isUnfinished(own.number)) {
-            name(own.pair);
+            places.name(candidates.get(own.pair), culprit);
             return true;
         }
     return false;
 }
 
 void ContactGaps::findNeighbours(vector<pair<int, int> >& neighbours) const {
-    for (const NearPair& own : near) {
-        const PlaceOnChain &a = places[pairs.get(own.pair).a].place, &b = places[pairs.get(own.pair).b].place;
-        if (a.pack >= 0 && b.pack >= 0)
-            neighbours.push_back(make_pair(a.chain, b.chain));
-    }
+    for (const NearPair& own : near)
+        places.addNeighbours(candidates.get(own.pair), neighbours);
 }
 
 void ContactGaps::findPushes(const double*, vector<Push>& pushes) const {
@@ -594,8 +333,8 @@ void ContactGaps::findPushes(const double*, vector<Push>& pushes) const {
             const ContactPair pair = pairOfLever(own, lever);
             pushes.push_back(pushOfContact(search->getSystem(), pair.a, pair.b, own.fractions[lever][0],
                     own.fractions[lever][1], force, own.gap.levers[lever].gradient));
-            pushes.back().chains[0] = places[pair.a].place.chain;
-            pushes.back().chains[1] = places[pair.b].place.chain;
+            pushes.back().chains[0] = places.get(pair.a).chain;
+            pushes.back().chains[1] = places.get(pair.b).chain;
         }
     }
 }

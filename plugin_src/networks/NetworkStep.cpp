@@ -121,13 +121,9 @@ Instability NetworkStep::step(const double* positions, const double* forces, con
     result.chain = stepApart(whole, apart);
     if (result.chain >= 0)
         return result;
+    received.clear();
     mayBeSoft = true;
-    bool taken = takeStep(whole, displacements, failed, result);
-    if (!taken && areSoft) {
-        // What lies on top of each other, as filaments that are drawn at random do, comes apart with hard contacts.
-        mayBeSoft = false;
-        taken = takeStep(whole, displacements, failed, result);
-    }
+    const bool taken = takeStep(whole, displacements, failed, result);
     result.iterations = iterations;
     if (!taken) {
         result.chain = find(failed.begin(), failed.end(), true)-failed.begin();
@@ -183,20 +179,30 @@ int NetworkStep::stepApart(const Attempt& attempt, const vector<bool>& apart) {
     return -1;
 }
 
-/** Attempt a step, and divide it for those chains that it fails for; false if that fails as well. */
+/**
+ * Attempt a step, and divide it for those chains that it fails for; false if that fails as well. What lies on top of
+ * each other, as filaments that are drawn at random do, comes apart with hard contacts.
+ */
 bool NetworkStep::takeStep(const Attempt& whole, double* displacements, vector<bool>& failed, Instability& result) {
-    received.clear();
     if (attempt(whole, displacements, failed)) {
         addImpulses(whole.taken, whole.settings.stepSize);
         return true;
     }
     const vector<bool> divided = findComponents(failed);
-    vector<bool> others = divided;
-    others.flip();
+    vector<bool> others = whole.taken;
+    for (size_t chain = 0; chain < others.size(); chain++)
+        others[chain] = others[chain] && !divided[chain];
     addImpulses(others, whole.settings.stepSize);
     result.divided = count(divided.begin(), divided.end(), true);
-    return divide({whole.positions, whole.forces, whole.box, whole.settings, divided, whole.loop}, 1, displacements,
-            failed);
+    const Attempt part = {whole.positions, whole.forces, whole.box, whole.settings, divided, whole.loop};
+    const size_t numReceived = received.size();
+    if (divide(part, 1, displacements, failed))
+        return true;
+    if (!areSoft)
+        return false;
+    received.resize(numReceived);
+    mayBeSoft = false;
+    return takeStep(part, displacements, failed, result);
 }
 
 bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<bool>& failed) {

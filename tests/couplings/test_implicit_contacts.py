@@ -72,6 +72,30 @@ def test_dense_filaments_do_not_cross_at_the_largest_step():
     assert context.getIntegrator().getNumDividedSteps() < 120
 
 
+def _steps_of_pairs(clump):
+    """Displacements of two filaments that overlap a little, far from some that are drawn on top of each other."""
+    generator = np.random.default_rng(1)
+    filaments = Filaments(VISCOSITY, 0)
+    filaments.add_straight(ACTIN, 5, [0, -250, -5000], [0, 1, 0])
+    filaments.add_straight(ACTIN, 5, [20, 0, -5250], [0, 0, 1])
+    for _ in range(clump):
+        filaments.add_straight(ACTIN, 10, generator.uniform(0, 700, 3), generator.normal(size=3))
+    _, system, positions = filaments.build()
+    system.addForce(capsule_contact_force(filaments, system, DIAMETER, STIFFNESS))
+    context = _context(filaments, system, positions, 5e6)
+    context.getIntegrator().step(1)
+    nodes = np.concatenate(filaments.node_indices[:2])
+    return positions_of(context)[nodes] - positions._value[nodes], context.getIntegrator().getNumDividedSteps()
+
+
+def test_contacts_that_a_step_takes_for_hard_are_those_around_what_failed():
+    alone, _ = _steps_of_pairs(0)
+    beside, divided = _steps_of_pairs(100)
+    assert divided > 30
+    assert np.abs(alone).max() > 1
+    np.testing.assert_allclose(beside, alone, atol=1e-6)
+
+
 # Restarts and threads: the same to the bit
 
 
