@@ -8,7 +8,7 @@ import openmm
 
 from ..engine_choice import load_plugin
 from ..errors import InputError
-from ..filaments.growth_refusals import growth_refusal
+from ..filaments.growth_refusals import HELD_BY_LINKERS, growth_refusal
 from .link_places import LinkPlaces
 
 _ADVICE = "filament_wall_force and capsule_contact_force can."
@@ -49,7 +49,8 @@ def refuse_links_of_growing(system: openmm.System, places: LinkPlaces, numbers: 
     for number, particles in zip(numbers, held.tolist()):
         for particle in particles:
             if particle in growing:
-                raise InputError(f"Crosslink {number}: {growth_refusal(growing[particle], 'a crosslink', _ADVICE)}")
+                refusal = growth_refusal(growing[particle], "a crosslink", HELD_BY_LINKERS)
+                raise InputError(f"Crosslink {number}: {refusal}")
 
 
 def refuse_forces_on_growing(system: openmm.System) -> None:

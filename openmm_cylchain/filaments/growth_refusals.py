@@ -5,6 +5,9 @@ from typing import Any
 
 from ..errors import InputError
 
+HELD_BY_LINKERS = "Linkers whose hands never unbind hold it as well: add_linkers(..., places=...)."
+"""What to do instead of a crosslink or an attachment."""
+
 
 def refuse_growth(filaments: Iterable[Any], what: str, advice: str = "") -> None:
     """Raise InputError, naming the first filament that grows, for something that needs nodes that stay.

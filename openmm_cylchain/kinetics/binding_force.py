@@ -133,7 +133,9 @@ def place_linkers(
         generator = np.random.default_rng((own.seed, number))
         hand = int(own.anchors is not None)
         if own.places is not None:
-            chains[: own.bound, hand], places[: own.bound, hand] = zip(*own.places)
+            for row, of_hands in enumerate(own.places):
+                for column, place in enumerate(of_hands, hand):
+                    chains[row, column], places[row, column] = place
         elif own.anchors is None:
             where = first_places.anywhere(own.kind.hands[0], own.bound, generator, own.kind.name)
             chains[: own.bound, 0], places[: own.bound, 0] = where

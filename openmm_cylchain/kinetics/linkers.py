@@ -64,8 +64,8 @@ class Linkers:
         Whether these stay in the plane z = 0.
     region : tuple of Shape
         All of which they are within then; the walls of the System if there are none.
-    places : tuple of (filament, arc length)
-        Where those begin bound, in nm from the first node, if that is given.
+    places : tuple of tuples of (filament, arc length)
+        Where the one hand, or both, of those begin bound, in nm from the first node, if that is given.
     """
 
     kind: Crosslinker
@@ -78,7 +78,7 @@ class Linkers:
     diffusion: float | None = None
     planar: bool = False
     region: tuple[Shape, ...] = ()
-    places: tuple[tuple[int, float], ...] | None = None
+    places: tuple[tuple[tuple[int, float], ...], ...] | None = None
 
 
 @dataclass(frozen=True)

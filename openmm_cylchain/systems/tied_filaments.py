@@ -13,7 +13,7 @@ from ..engines.protocol import PlacedFilaments
 from ..errors import InputError
 from ..filaments.attachments import Attachment, distribute_beads, locate
 from ..filaments.filament import Tether
-from ..filaments.growth_refusals import growth_refusal
+from ..filaments.growth_refusals import HELD_BY_LINKERS, growth_refusal
 from ..filaments.placement import named_nodes
 from ..filaments.segment_place import SegmentPlace
 from ..filaments.twist import EndFrame, has_twist
@@ -203,7 +203,7 @@ class TiedFilaments(AddedFilaments):
         """
         label = f"Attachment point {len(self._attachments)}"
         self._refuse_if_built(label)
-        filament = self._lasting_filament(filament, label, "an attachment point")
+        filament = self._lasting_filament(filament, label, "an attachment point", HELD_BY_LINKERS)
         return self._attach(locate(self[filament], filament, label, arc_length, segment, fraction))
 
     def segment_place(
@@ -229,7 +229,7 @@ class TiedFilaments(AddedFilaments):
             ``add_to``.
         """
         label = "Place on a segment"
-        filament = self._lasting_filament(filament, label, "a place on a segment")
+        filament = self._lasting_filament(filament, label, "a place on a segment", HELD_BY_LINKERS)
         place = locate(self[filament], filament, label, arc_length, segment, fraction)
         nodes = self.node_indices[filament]
         return SegmentPlace(int(nodes[place.segment]), int(nodes[(place.segment + 1) % len(nodes)]), place.fraction)
@@ -282,7 +282,7 @@ class TiedFilaments(AddedFilaments):
         diffusion: Scalar | None = None,
         planar: bool = False,
         region: Shape | Sequence[Shape] | None = None,
-        places: Sequence[tuple[int, Scalar]] | None = None,
+        places: Sequence[tuple[int, Scalar] | tuple[tuple[int, Scalar], tuple[int, Scalar]]] | None = None,
     ) -> int:
         """Add linkers that bind to filaments, walk along them and unbind: crosslinkers or motors.
 
@@ -322,9 +322,10 @@ class TiedFilaments(AddedFilaments):
             Whether those that are not bound stay in the plane z = 0. The factor of the rate is R'/R then.
         region : Shape, or several, optional
             What those that diffuse are within; the walls of the System (``filament_wall_force``) if not given.
-        places : sequence of (filament, arc length), optional
+        places : sequence of (filament, arc length), or of pairs of these, optional
             Where those begin bound, for each of them: the number of a filament, and the distance from its first node
-            along it with segments at rest. Hands with anchors that never unbind hold what grows there for ever.
+            along it with segments at rest; of linkers without anchors also two such places, one for each hand. Hands
+            that never unbind hold what grows for ever, as an attachment or a crosslink does.
 
         Returns
         -------
@@ -423,20 +424,29 @@ class TiedFilaments(AddedFilaments):
 
     def _first_places(self, places, linkers):
         label = f"Linkers {linkers.kind.name!r}"
-        hand = linkers.kind.hands[0 if linkers.anchors is None else 1]
+        hands = linkers.kind.hands[0 if linkers.anchors is None else 1 :]
         if len(places) != linkers.bound:
             raise InputError(f"{label}: {linkers.bound} begin bound, but there are {len(places)} places for them.")
         found = []
-        for filament, along in places:
-            number = self._filament_number(filament, label)
-            along = non_negative(along, LENGTH, f"{label}: places")
-            length = contour_of(self[number])[-1]
-            if not hand.binds(self[number].type) or hand.site_spacing is not None:
-                raise InputError(f"{label}: places are for hands without sites, which bind to filament {number}.")
-            if along > length * (1.0 + 1e-9):
-                raise InputError(f"{label}: {along:g} nm is beyond the end of filament {number}, {length:g} nm long.")
-            found.append((number, min(along, length)))
+        for own in places:
+            of_hands = own if isinstance(own[0], (tuple, list)) else (own,)
+            if len(of_hands) > len(hands):
+                raise InputError(f"{label}: a linker with an anchor has one hand, and one place.")
+            found.append(tuple(self._first_place(place, hand, label) for place, hand in zip(of_hands, hands)))
+            if len(of_hands) == 2 and found[-1][0][0] == found[-1][1][0] and not linkers.kind.same_filament:
+                raise InputError(f"{label}: both hands are on filament {found[-1][0][0]}: add same_filament=True.")
         return tuple(found)
+
+    def _first_place(self, place, hand, label):
+        filament, along = place
+        number = self._filament_number(filament, label)
+        along = non_negative(along, LENGTH, f"{label}: places")
+        length = contour_of(self[number])[-1]
+        if not hand.binds(self[number].type) or hand.site_spacing is not None:
+            raise InputError(f"{label}: places are for hands without sites, which bind to filament {number}.")
+        if along > length * (1.0 + 1e-9):
+            raise InputError(f"{label}: {along:g} nm is beyond the end of filament {number}, {length:g} nm long.")
+        return number, min(along, length)
 
     def _attach(self, attachment):
         self._attachments.append(attachment)

@@ -48,9 +48,20 @@ def test_hands_are_bound_where_they_are_told():
     np.testing.assert_allclose(table.arc_lengths[:3, 0], [1000.0, 1000.0, 250.0])
 
 
+def test_both_hands_are_bound_where_they_are_told():
+    both = 'arc_length = "1 um", second_filament = [1, 0], second_arc_length = "500 nm"'
+    simulation, built = begun(FILAMENTS + LINKERS.replace('arc_length = "1 um"', both))
+    table = built.filaments.in_context(simulation.context).linkers()
+    assert table.filaments[:4].tolist() == [[0, 1], [2, 0], [1, -1], [-1, -1]]
+    np.testing.assert_allclose(table.arc_lengths[:2], [[1000.0, 500.0], [1000.0, 500.0]])
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
+        ('"1 um" }', '"1 um", second_filament = 1, second_arc_length = "0 nm" }', "2 numbers, and second_filament 1"),
+        ('"1 um" }', '"1 um", second_filament = [1, 1] }', "second_arc_length"),
+        ('"1 um" }', '"1 um", second_arc_length = "0 nm" }', "needs a second_filament"),
         ("bound_at", "bound = 2\nbound_at", "bound.*cannot be with bound_at"),
         ("[0, 2]", "[0, 3]", "filament 3 does not exist"),
         ('"1 um" }, {', '"2 um" }, {', "beyond the end of filament 0"),

@@ -253,6 +253,9 @@ def _severing(entries):
     return Severing(rate=entries["severing_rate"], of_states=states, shrinks=shrinks)
 
 
+_HELD_BY_LINKERS = "Hands of [[linkers]] with bound_at and an unbinding_rate of 0 hold them as well."
+
+
 def check_with_others(tables, configuration, settings):
     """Raise ConfigurationError where filaments that grow have what they cannot have.
 
@@ -278,10 +281,12 @@ def check_with_others(tables, configuration, settings):
             _check_tether(entries, number, own.node, groups)
     for entries, own in zip(tables["link"], configuration.links):
         if own.between is None:
-            raise entries.at("within").error("may join filaments that grow, which links do not yet: give between.")
+            raise entries.at("within").error(
+                f"may join filaments that grow, which links do not yet: give between. {_HELD_BY_LINKERS}"
+            )
         for place in own.between:
             if place["filament"] is not None:
-                _refuse_growth(entries, place["filament"], groups, "links do not join")
+                _refuse_growth(entries, place["filament"], groups, "links do not join", _HELD_BY_LINKERS)
 
 
 def _refuse_unused(tables):
@@ -305,10 +310,9 @@ def _check_tether(entries, number, node, groups):
         )
 
 
-def _refuse_growth(entries, number, groups, what):
+def _refuse_growth(entries, number, groups, what, advice="Leave its growth out, or take another filament."):
     group = group_of(number, groups)
     if group.growth is not None:
         raise entries.error(
-            f"means filament {number}, which grows ({group.label}): {what} filaments that grow "
-            "yet. Leave its growth out, or take another filament."
+            f"means filament {number}, which grows ({group.label}): {what} filaments that grow yet. {advice}"
         )

@@ -164,8 +164,10 @@ _BOUND_AT = TableKind(
     (
         Key("filament", NUMBERS, REQUIRED, "Number of a filament, or a list of them."),
         Key("arc_length", Quantity(units.LENGTH, "zero"), REQUIRED, "Distance from the first node along it."),
+        Key("second_filament", NUMBERS, None, "That of the second hand, if it is bound too; of a list, a list."),
+        Key("second_arc_length", Quantity(units.LENGTH, "zero"), None, "Where the second hand is."),
     ),
-    "Where a hand is bound as a run begins.",
+    "Where a hand is bound as a run begins, or both.",
     owner="bound_at of [[linkers]]",
 )
 _BOUND_AT_EXAMPLE = '[{ filament = 0, arc_length = "1 um" }]'
@@ -283,11 +285,7 @@ def read_linkers(entries, groups, box, seed, walls=(), bodies=()):
     places = None
     if entries["bound_at"] is not None:
         entries.refuse(("bound",), "cannot be with bound_at, which says how many.")
-        places = tuple(
-            (number, own["arc_length"])
-            for own in entries["bound_at"]
-            for number in np.atleast_1d(own["filament"]).tolist()
-        )
+        places = tuple(place for own in entries["bound_at"] for place in _first_places(own))
         last = (len(places), *last[1:])
     group = LinkerGroup(_kind(entries), *first, anchors, *last, region, entries["keep"], on_bodies, places)
     with entries.naming():
@@ -375,6 +373,18 @@ _KIND_KEYS = (
     *("stiffness", "rest_length", "same_filament", "name"),
     *("cosine_range", "trans_activated", "reversible", "loading_distance"),
 )
+
+
+def _first_places(entries):
+    first = [(number, entries["arc_length"]) for number in np.atleast_1d(entries["filament"]).tolist()]
+    if entries["second_filament"] is None:
+        entries.refuse(("second_arc_length",), "needs a second_filament.")
+        return first
+    entries.require("second_arc_length")
+    second = [(number, entries["second_arc_length"]) for number in np.atleast_1d(entries["second_filament"]).tolist()]
+    if len(first) != len(second):
+        raise entries.error(f"filament has {len(first)} numbers, and second_filament {len(second)}.")
+    return list(zip(first, second))
 
 
 def _kind(entries):
