@@ -444,6 +444,8 @@ class TiedFilaments(AddedFilaments):
         length = contour_of(self[number])[-1]
         if not hand.binds(self[number].type) or hand.site_spacing is not None:
             raise InputError(f"{label}: places are for hands without sites, which bind to filament {number}.")
+        if self[number].is_reserve:
+            raise InputError(f"{label}: filament {number} is not there yet, so that no hand can be bound to it.")
         if along > length * (1.0 + 1e-9):
             raise InputError(f"{label}: {along:g} nm is beyond the end of filament {number}, {length:g} nm long.")
         return number, min(along, length)
