@@ -6,6 +6,7 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import (
+    ACTIN_ATP,
     F_ACTIN,
     MICROTUBULE,
     Body,
@@ -134,6 +135,12 @@ def test_their_anchors_may_be_on_bodies():
 def test_what_is_refused(places, message):
     with pytest.raises(InputError, match=message):
         two_filaments().add_linkers(HOLDS, anchors=np.zeros((2, 3)), bound=2, places=places)
+    later = two_filaments()
+    later.add_reserve(
+        F_ACTIN.with_segment_length(108.0), 3, growth=Growth(monomers=ACTIN_ATP, pool=MonomerPool(1e-6), longest=540.0)
+    )
+    with pytest.raises(InputError, match="filament 2 is not there yet"):
+        later.add_linkers(HOLDS, count=1, volume=1e9, bound=1, places=[(2, 0.0)])
     both = [((0, 0.0), (0, 10.0))]
     with pytest.raises(InputError, match="both hands are on filament 0"):
         two_filaments().add_linkers(HOLDS, count=1, volume=1e9, bound=1, places=both)
