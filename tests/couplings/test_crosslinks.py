@@ -382,7 +382,7 @@ def test_twenty_thousand_changes_and_steps_take_no_memory():
     assert sizes[-1] - sizes[1] < 1000, sizes
 
 
-BY_DEFAULT = [("compiled", "implicit", "filament"), ("compiled", "midpoint", "particle")]
+BY_DEFAULT = [("compiled", "implicit", "filament")]
 OTHERS = [(*which, partner) for which in ENGINE_SCHEMES for partner in ("particle", "filament")]
 OTHERS = [pytest.param(*which, marks=pytest.mark.slow) for which in OTHERS if which not in BY_DEFAULT]
 
