@@ -17,9 +17,8 @@ import numpy.typing as npt
 import scipy
 
 from ..errors import InputError
-from ..filaments.beam_refusals import refuse_beams
 from ..filaments.collection import FilamentCollection
-from ..filaments.growth_refusals import refuse_growth
+from ..filaments.refusals import refuse_beams, refuse_growth
 from ..mechanics.geometry import cross
 from ..units.quantities import LENGTH, in_units_of, positive, shown
 from ..units.types import BoolArray, BoxVectors, FloatArray, IntArray, Scalar, Vectors

@@ -400,15 +400,22 @@ class Run:
         counts = self.growth.get("nodes", np.ones((0, 0)))
         gone = np.flatnonzero((counts == 0).any(axis=0))
         grown = {int(number) for number in self.growth["filament"][0][gone]} if len(gone) else set()
-        return frozenset(grown.union(*map(self._absent, range(len(self)))))
+        return frozenset(grown.union(*self._absent_in_stages))
+
+    @cached_property
+    def _absent_in_stages(self):
+        # Of filaments that do not grow, the numbers of those that a stage does not have: all particles in one place.
+        fixed = [(number, own.nodes) for number, own in enumerate(self.filaments) if not own.monomer_length]
+        frames = map(self.positions, np.minimum(self._last_frames, len(self) - 1).tolist())
+        return [frozenset(i for i, nodes in fixed if np.all(frame[nodes] == frame[nodes[0]])) for frame in frames]
+
+    @cached_property
+    def _last_frames(self):
+        return np.cumsum([own.frames for own in self._description.stages], dtype=int)
 
     def _absent(self, frame):
-        # Of filaments that do not grow, the numbers of those that a stage does not have: all particles in one place.
-        if not self._description.stages:
-            return frozenset()
-        positions = self.positions(frame)
-        fixed = ((number, own.nodes) for number, own in enumerate(self.filaments) if not own.monomer_length)
-        return frozenset(number for number, nodes in fixed if np.all(positions[nodes] == positions[nodes[0]]))
+        stages = self._description.stages
+        return self._absent_in_stages[np.searchsorted(self._last_frames, self._frame(frame))] if stages else frozenset()
 
     def monomers(self, frame: int) -> dict[int, IntArray]:
         """The number of the first monomer of filaments that grow, and that behind the last one, in a frame.
@@ -424,8 +431,10 @@ class Run:
     def _nodes_in(self, frame):
         # Particles of the nodes that filaments have in a frame.
         nodes = [own.nodes for own in self.filaments]
-        for number, chain in self.grown(frame).items():
-            nodes[number] = nodes[number][: chain.nodes]
+        if self.growth:
+            frame = self._frame(frame)
+            for number, count in zip(self.growth["filament"][frame], self.growth["nodes"][frame]):
+                nodes[int(number)] = nodes[int(number)][: int(count)]
         for number in self._absent(frame):
             nodes[number] = nodes[number][:0]
         return nodes

@@ -8,7 +8,7 @@ import openmm
 
 from ..engine_choice import load_plugin
 from ..errors import InputError
-from ..filaments.growth_refusals import HELD_BY_LINKERS, growth_refusal
+from ..filaments.refusals import HELD_BY_LINKERS, growth_refusal
 from .link_places import LinkPlaces
 
 _ADVICE = "filament_wall_force and capsule_contact_force can."

@@ -9,7 +9,7 @@ import openmm
 
 from ..errors import InputError
 from ..filaments.collection import FilamentCollection, require_filaments
-from ..filaments.growth_refusals import growth_refusal
+from ..filaments.refusals import growth_refusal
 from ..output.files import TextFile
 from ..output.reporters import FilamentsReporter
 from ..units.quantities import (

@@ -25,7 +25,7 @@ from ..time_steps.schemes import SCHEMES as ALL_SCHEMES
 from ..time_steps.step_watch import DividedSteps, ExplicitWork
 from ..time_steps.time_step import as_step
 from ..units.quantities import TEMPERATURE, non_negative, whole_number
-from .compiled_twist import set_end_frame, set_twists_of, twists_of
+from .compiled_twist import set_end_frame
 from .description import (
     advice_after_blow_up,
     filament_label,
@@ -166,14 +166,6 @@ class CompiledEngine(Engine):
                 _set_tethers(force, tethers)
                 force.updateParametersInContext(context)
                 _set_tethers(force, {number: placed.tethers[number] for number in tethers})
-
-    def twists(self, context, filament):
-        """Those that the Context has."""
-        return twists_of(context, filament)
-
-    def set_twists(self, context, filament, twists):
-        """Others, of as many joints."""
-        set_twists_of(context, filament, twists)
 
     def record_tensions(self, context):
         """See ``NativeIntegrator.setRecordsTensions``."""

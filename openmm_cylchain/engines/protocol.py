@@ -137,14 +137,6 @@ class Engine(ABC):
     def set_tethers(self, context: openmm.Context, placed: PlacedFilaments, tethers: dict[int, Tether]) -> None:
         """Give a Context other tethers, by their numbers, and those of the description for the rest."""
 
-    def twists(self, context: openmm.Context, filament: int) -> np.ndarray:
-        """Twists (joints,) in radians of a filament with twist, with those to the frames beyond its ends."""
-        raise NotImplementedError
-
-    def set_twists(self, context: openmm.Context, filament: int, twists: np.ndarray) -> None:
-        """Give a filament with twist in a Context other twists."""
-        raise NotImplementedError
-
     @abstractmethod
     def record_tensions(self, context: openmm.Context) -> None:
         """Let the integrator of a Context record mean tensions from its next step on; InputError if it cannot."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -64,13 +63,3 @@ def end_number(end: str, label: str) -> int:
 def has_twist(filament_type: Any) -> bool:
     """Whether filaments of a type resist twist."""
     return getattr(filament_type, "torsional_rigidity", None) is not None
-
-
-def refuse_twist(filaments: Iterable[Any], what: str) -> None:
-    """Raise InputError, naming the first filament with twist, for something that knows none."""
-    for number, filament in enumerate(filaments):
-        if has_twist(filament.type):
-            raise InputError(
-                f"Filament {number} ({filament.type.name}) has twist, which {what} cannot have as yet: leave out "
-                "torsional_rigidity and twist_persistence_length of its type."
-            )

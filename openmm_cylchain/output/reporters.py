@@ -18,10 +18,9 @@ import numpy.typing as npt
 import openmm
 
 from ..errors import InputError
-from ..filaments.beam_refusals import refuse_beams
 from ..filaments.collection import FilamentCollection, require_filaments
 from ..filaments.grown import GrownChain
-from ..filaments.growth_refusals import refuse_growth
+from ..filaments.refusals import refuse_beams, refuse_growth
 from ..mechanics.redistribution import ChainSet
 from ..mechanics.tension import axial_tensions, filament_tensions
 from ..units.quantities import LARGEST_INT, shown, true_or_false, whole_number

@@ -17,7 +17,7 @@ from ..filaments.chain_type import ChainType
 from ..filaments.filament import Filament
 from ..filaments.filament_type import FilamentType
 from ..filaments.growth import Growth
-from ..filaments.growth_refusals import growth_refusal
+from ..filaments.refusals import growth_refusal
 from ..filaments.shapes import FilamentOptions
 from ..filaments.twist import has_twist
 from ..kinetics.nucleation import Nucleation, require_nucleation

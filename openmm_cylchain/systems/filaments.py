@@ -17,9 +17,7 @@ from ..engines.description import describe_chains, filament_label, refuse_constr
 from ..engines.protocol import IntegratorSettings
 from ..errors import InputError
 from ..filaments.attachments import add_virtual_site, attachment_positions, neighbors
-from ..filaments.beam_refusals import refuse_beams
-from ..filaments.growth_refusals import refuse_growth
-from ..filaments.twist import refuse_twist
+from ..filaments.refusals import refuse_beams, refuse_growth, refuse_twist
 from ..kinetics.linkers import refuse_barriers_without_linkers, refuse_linkers_without_volume
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.redistribution import ChainSet

@@ -10,13 +10,13 @@ import openmm
 from openmm import unit
 
 from ..couplings.beam_curves import BeamCurves
+from ..engines.compiled_twist import set_twists_of, twists_of
 from ..engines.description import describe_chains
 from ..engines.protocol import Engine, PlacedFilaments
 from ..errors import InputError
-from ..filaments.beam_refusals import refuse_beams
 from ..filaments.filament import Tether
-from ..filaments.growth_refusals import refuse_growth
-from ..filaments.twist import end_number, has_twist, refuse_twist
+from ..filaments.refusals import refuse_beams, refuse_growth, refuse_twist
+from ..filaments.twist import end_number, has_twist
 from ..kinetics.binding_force import (
     find_binding_force,
     naming_unknown_linkers,
@@ -308,7 +308,7 @@ class FilamentsInContext:
         InputError
             For a filament that does not exist or has no twist.
         """
-        return self._engine.twists(self._context, self._twisted(filament)) * unit.radian
+        return twists_of(self._context, self._twisted(filament)) * unit.radian
 
     def set_twists(self, filament: int, twists: npt.ArrayLike) -> None:
         """Give a filament other twists, such as those of another run, or of a ring that is closed with some turns.
@@ -321,10 +321,10 @@ class FilamentsInContext:
         """
         number = self._twisted(filament)
         values = np.asarray(in_units_of(twists, ANGLE, "twists"))
-        count = len(self._engine.twists(self._context, number))
+        count = len(twists_of(self._context, number))
         if values.shape != (count,):
             raise InputError(f"twists must have the shape ({count},), but have {values.shape}.")
-        self._engine.set_twists(self._context, number, values)
+        set_twists_of(self._context, number, values)
 
     def turn_end(self, filament: int, end: str, angle: Scalar) -> None:
         """Turn the frame that holds an end of a filament, at once: turn it by little between steps.
@@ -346,9 +346,9 @@ class FilamentsInContext:
         frames = [own for own in self._placed.end_frames if (own.filament, own.end) == (number, end)]
         if not frames or frames[0].torque is not None:
             raise InputError(f"The {end} end of filament {number} has no frame that is held: add it by add_end_frame.")
-        twists = self._engine.twists(self._context, number)
+        twists = twists_of(self._context, number)
         twists[-1 if side else 0] += finite_number(angle, ANGLE, "angle") * (1 if side else -1)
-        self._engine.set_twists(self._context, number, twists)
+        set_twists_of(self._context, number, twists)
 
     def _twisted(self, filament):
         number, count = whole_number(filament, 0, "filament"), len(self._placed.filaments)

@@ -43,9 +43,8 @@ import openmm
 from ..engine_choice import default_scheme
 from ..errors import InputError, InstabilityError
 from ..filaments.collection import require_filaments
-from ..filaments.growth_refusals import refuse_growth
 from ..filaments.placement import refuse_coinciding
-from ..filaments.twist import refuse_twist
+from ..filaments.refusals import refuse_growth, refuse_twist
 from ..kinetics.binding_force import find_binding_force
 from ..mechanics.flow import Flow
 from ..mechanics.geometry import segment_vectors

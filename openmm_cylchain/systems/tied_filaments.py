@@ -13,8 +13,8 @@ from ..engines.protocol import PlacedFilaments
 from ..errors import InputError
 from ..filaments.attachments import Attachment, distribute_beads, locate
 from ..filaments.filament import Tether
-from ..filaments.growth_refusals import HELD_BY_LINKERS, growth_refusal
 from ..filaments.placement import named_nodes
+from ..filaments.refusals import HELD_BY_LINKERS, growth_refusal
 from ..filaments.segment_place import SegmentPlace
 from ..filaments.twist import EndFrame, has_twist
 from ..kinetics.barrier import Barrier, as_barrier

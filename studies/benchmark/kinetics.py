@@ -10,7 +10,7 @@ In turn with them, ``many_linkers`` are timed beside the mechanics of their fila
 """
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,7 +67,8 @@ class KineticsEffort:
 
 _SYSTEMS = (BundleSystem(), BundleSystem(name="bundle_without_contacts", contacts=False))
 FULL = KineticsEffort(_SYSTEMS, (1000.0, 2000.0, 2500.0), 200, 1e6, 20, 4, 50, 7, 2.0)
-QUICK = KineticsEffort(_SYSTEMS, (2000.0,), 50, 1e5, 4, 2, 10, 3, 1.0, NetworkSystem(steps=100))
+_SHORT_SYSTEMS = tuple(replace(own, filaments=60, motors=400, crosslinkers=400, length=2000.0) for own in _SYSTEMS)
+QUICK = KineticsEffort(_SHORT_SYSTEMS, (2000.0,), 50, 1e5, 4, 2, 10, 3, 1.0, NetworkSystem(steps=100))
 
 
 @dataclass(frozen=True)

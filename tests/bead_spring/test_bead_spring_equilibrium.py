@@ -184,7 +184,7 @@ DRAWN = [
 def test_draws_have_the_exact_moments(nu, reduced_temperature, bonds, planar):
     from openmm_cylchain.bead_spring.draws import draw_bonds
 
-    count = 20000
+    count = 5000
     drawn = draw_bonds(nu, reduced_temperature, bonds, np.random.default_rng(11), count, planar)
     assert drawn.shape == (count, bonds, 3)
     lengths = np.linalg.norm(drawn, axis=2)

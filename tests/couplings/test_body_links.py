@@ -23,6 +23,7 @@ def _check_mean(samples, expected, largest):
     assert of_copies.mean() == pytest.approx(expected, abs=4 * error)
 
 
+@pytest.mark.sample(r"^0\.2|^20")
 @pytest.mark.parametrize("step", [0.2, 2.0, 20.0])
 def test_two_springs(step):
     """Opposite points of a sphere on springs to two points: its direction has the weight exp(c cos)."""

@@ -53,10 +53,8 @@ def _bends_in_steps(step, steps, count):
     return blocks.mean(axis=0), blocks.std(axis=0, ddof=1) / np.sqrt(len(blocks))
 
 
-@pytest.mark.parametrize(
-    ("milliseconds", "steps"),
-    [pytest.param(5.0, 200, marks=pytest.mark.slow), (1.0, 150), pytest.param(0.2, 1500, marks=pytest.mark.slow)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("milliseconds", "steps"), [(5.0, 200), (1.0, 150), (0.2, 1500)])
 def test_bends_between_walls(milliseconds, steps):
     """Against draws from equilibrium, which NumPy makes. Steps of any length are within 8 % of it."""
     drawn = _modes(draw_heights(SEGMENTS, LENGTH, RIGIDITY / KT, THICKNESS, STIFFNESS / KT, 40000, seed=3))

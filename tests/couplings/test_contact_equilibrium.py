@@ -78,6 +78,7 @@ def test_energies_of_the_package_are_those_of_monte_carlo(name):
     assert min(totals.values()) > 1
 
 
+@pytest.mark.slow
 def test_monte_carlo_of_a_pair_is_that_of_draws():
     middles, along, weights = linked_pair(PAIR, 300000, 1)
     exact, exact_errors = means_of(PAIR, observe(PAIR, middles, along), weights)
@@ -102,8 +103,7 @@ def test_a_pair_of_rods_on_a_spring(factor):
     check(PAIR, rows, *np.transpose(list(REFERENCES["pair"].values())))
 
 
-@pytest.mark.sample("^1")
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("stiffness", [0.02, 1.0, 5.0])
 def test_contacts_of_rods_on_springs(stiffness):
     """Of springs that are softer and stiffer than the contact, at the recommended step."""

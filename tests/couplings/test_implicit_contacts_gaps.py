@@ -92,6 +92,7 @@ def _check(segments, sphere, share_of_step, samples, pairs=400):
     assert (np.abs(ratios - 1) < 0.05).all(), ratios
 
 
+@pytest.mark.slow
 def test_gaps_of_two_rods_at_the_recommended_step():
     _check(1, False, 1.0, 800)
 

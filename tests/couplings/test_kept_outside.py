@@ -17,7 +17,7 @@ from support.solvent import KT, TEMPERATURE, VISCOSITY
 INNER, OUTER, BEAD = 60.0, 150.0, 10.0
 
 
-@pytest.mark.sample("-3.0-sphere|^5.0-30.0-cyl")
+@pytest.mark.sample("^5.0-3.0-sphere|^5.0-30.0-cyl")
 @pytest.mark.parametrize(("shape", "power"), [("sphere", 2), ("cylinder", 1)])
 @pytest.mark.parametrize(("stiffness", "motion"), [(0.05, 3.0), (5.0, 3.0), (5.0, 30.0)])
 def test_particles_between(shape, power, stiffness, motion):

@@ -6,7 +6,7 @@ from openmm import unit
 
 from openmm_cylchain import Box, Capsule, Cylinder, Ellipsoid, InputError, Plane, Slab, Sphere, Torus, random_points_on
 
-COUNT = 20000
+COUNT = 5000
 LOWER, UPPER = np.array([-40.0, -60.0, -50.0]), np.array([70.0, 50.0, 30.0])
 TILTED = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
 SHAPES = {

@@ -238,7 +238,7 @@ def monte_carlo(count, elements, element, planar, leaps, samples, seed):
     ("elements", "bend", "planar", "count", "leaps", "samples", "runs"),
     [
         (5, 0.1, False, 64, 250, 50, 300),
-        (5, 0.1, True, 128, 250, 60, 150),
+        pytest.param(5, 0.1, True, 128, 250, 60, 150, marks=pytest.mark.slow),
         pytest.param(6, 0.25, False, 128, 350, 36, 200, marks=pytest.mark.slow),
     ],
 )

@@ -147,6 +147,7 @@ def weights_in_a_slab(monomers, lower, upper):
     )
 
 
+@pytest.mark.sample("^2.0")
 @pytest.mark.slow
 @pytest.mark.parametrize(("microseconds", "steps"), [(2.0, 1600), (20.0, 1600)])
 def test_rods_between_walls(microseconds, steps):

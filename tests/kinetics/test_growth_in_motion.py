@@ -151,6 +151,7 @@ def weights_in_a_slab(monomers):
     return np.array(weights)
 
 
+@pytest.mark.sample("^20")
 @pytest.mark.slow
 @pytest.mark.parametrize("microseconds, steps", [(2.0, 12000), (20.0, 1600)])
 def test_lengths_of_rods_between_walls_are_in_equilibrium(microseconds, steps):

@@ -12,16 +12,16 @@ from openmm_cylchain import MICROTUBULE, Crosslinker, Cylinder, Filaments, Hand,
 from support.contexts import new_context, positions_of
 
 MILLISECOND = 1e3
-BUNDLE = BundleSystem(filaments=30, motors=400, crosslinkers=100, length=3000.0)
+BUNDLE = BundleSystem(filaments=20, motors=267, crosslinkers=67, length=3000.0)
 
 
 def _shortening(system, positions, step, seeds):
-    """By which part a bundle shortens in 1.6 s, for each seed."""
+    """By which part a bundle shortens in 2 s, for each seed."""
     parts = []
     for seed in seeds:
         bundle = create_bundle(system, step * MILLISECOND, seed=seed, positions=positions)
         start = bundle.length()
-        bundle.integrator.step(round(1600.0 / step))
+        bundle.integrator.step(round(2000.0 / step))
         parts.append(1.0 - bundle.length() / start)
     return np.array(parts)
 
@@ -31,10 +31,10 @@ def test_motors_shorten_a_bundle_and_crosslinkers_alone_do_not():
     """As fast in steps of 2.5 ms as in steps of 0.8 ms, which resolve contacts, within what seeds differ by."""
     positions = relaxed_positions(BUNDLE, 100)
     with_motors = _shortening(BUNDLE, positions, 2.5, range(1, 9))
-    in_short_steps = _shortening(BUNDLE, positions, 0.8, range(31, 34))
+    in_short_steps = _shortening(BUNDLE, positions, 0.8, range(31, 33))
     without = _shortening(replace(BUNDLE, speed=0.0), positions, 2.5, range(1, 4))
     error = np.sqrt(with_motors.var(ddof=1) * (1 / len(with_motors) + 1 / len(in_short_steps)))
-    assert with_motors.mean() > 0.08
+    assert with_motors.mean() > 0.1
     assert abs(without.mean()) < 0.25 * with_motors.mean()
     assert 3 * error < with_motors.mean()
     assert abs(with_motors.mean() - in_short_steps.mean()) < 3 * error

@@ -202,7 +202,7 @@ def test_catastrophes_that_come_with_the_length():
     context = context_of(filaments)
     context.getIntegrator().step(20)
     lengths, numbers = [], []
-    for _ in range(60):
+    for _ in range(45):
         context.getIntegrator().step(8)
         state = filaments.in_context(context).growth()
         there = state.nodes > 0

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import re
-import signal
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from openmm_cylchain.output.read_tables import read_reports
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
 from support import small_runs
 from support.checkpoints import resealed
-from support.commands import finish, start, wait_for_size
 from support.configurations import placed_filaments
 from support.repository import EXAMPLES
 from support.run_figures import rendered
@@ -31,7 +29,6 @@ NETWORK = small_runs.NETWORK.replace(small_runs.MOTOR, MOTOR).replace(
 )
 FRAMES = 41
 PN = 0.602214076
-FILES = ("trajectory.dcd", "energies.csv", "linkers.csv", "linkers.npy")
 
 
 @pytest.fixture(scope="module")
@@ -283,25 +280,6 @@ def test_tables_and_places_are_those_of_the_linkers(unbroken):
                 np.testing.assert_allclose((mean, largest), (tensions.mean(), tensions.max()), atol=2e-3)
             else:
                 assert np.isnan(mean) and np.isnan(largest)
-
-
-def test_killed_run_resumes_to_the_same_files(tmp_path, unbroken, capsys):
-    output = tmp_path / "out"
-    config = tmp_path / "input.toml"
-    config.write_text(NETWORK)
-    frame = (unbroken / "trajectory.dcd").stat().st_size // FRAMES
-    process = start(str(config), output)
-    wait_for_size(output / "trajectory.dcd", 276 + 17 * frame, process)
-    process.kill()
-    assert finish(process)[0] == -signal.SIGKILL
-    # What a kill may leave half written.
-    for name in ("linkers.csv", "linkers.npy"):
-        with open(output / name, "ab") as file:
-            file.write(b"1")
-    assert main(["run", str(config), "--output", str(output), "--resume"]) == 0
-    assert "Resuming at step" in capsys.readouterr().out
-    for name in FILES:
-        assert (output / name).read_bytes() == (unbroken / name).read_bytes(), name
 
 
 def test_linkers_that_are_gone_are_refused(tmp_path, unbroken, capsys):
