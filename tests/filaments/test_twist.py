@@ -5,7 +5,16 @@ import openmm
 import pytest
 from openmm import unit
 
-from openmm_cylchain import F_ACTIN, Filaments, FilamentType, InputError, analysis, capsule_contact_force, theory
+from openmm_cylchain import (
+    F_ACTIN,
+    Filaments,
+    FilamentType,
+    InputError,
+    analysis,
+    capsule_contact_force,
+    check_time_step,
+    theory,
+)
 from openmm_cylchain.engines.compiled import CylinderChainForce
 from openmm_cylchain.units.quantities import BOLTZMANN
 from support.contexts import new_context, positions_of
@@ -230,6 +239,34 @@ def test_steps_taken_alone_are_those_taken_together():
             context.getIntegrator().step(40 // calls)
         ends.append((positions_of(context), own.twists(0)._value))
     assert np.array_equal(ends[0][0], ends[1][0]) and np.array_equal(ends[0][1], ends[1][1])
+
+
+def test_step_is_checked():
+    """Of free chains and of rings that begin, in each window, with the turns that they have."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    for number in range(8):
+        filaments.add_equilibrium(DNA, 8, number)
+    rings = [filaments.add_ring(DNA, 16, [200.0 * number, 0, 0]) for number in range(2)]
+    _, system, positions = filaments.build()
+    twists = {ring: np.full(16, np.pi / 16) for ring in rings}
+    check = check_time_step(filaments, system, positions, NANOSECOND, frames=48, twists=twists)
+    free, closed = check["DNA x 8 twist, mean square"], check["DNA x 16 twist, mean square"]
+    assert check["DNA x 8 twist energy"].values == pytest.approx((0.5, 0.5), rel=0.25)
+    # Some of the half turn of rings is writhe.
+    assert closed.verdict == "right" and all(0.5 < value / np.pi**2 < 1.0 for value in closed.values)
+    # Both runs follow one path.
+    assert free.unpaired_standard_error > 2 * free.standard_error
+    filaments = held_chains(2, 4)
+    filaments.add_straight(DNA, 4, [300, 0, 0], [0, 0, 1])
+    _, system, positions = filaments.build()
+    check = check_time_step(filaments, system, positions, NANOSECOND, frames=2)
+    assert {one.name for one in check.observables if "twist, " in one.name} == {
+        "DNA x 4 twist, mean square",
+        "DNA x 4 (filament 2) twist, mean square",
+    }
+    for wrong, message in (([1.0], "twists"), ({0: np.zeros(4)}, "shape"), ({3: np.zeros(5)}, "does not exist")):
+        with pytest.raises(InputError, match=message):
+            check_time_step(filaments, system, positions, NANOSECOND, frames=2, twists=wrong)
 
 
 # Linking numbers
