@@ -1,5 +1,7 @@
 """Filaments with twist: what they are given, their equilibrium at any step, linking numbers, and what is refused."""
 
+import warnings
+
 import numpy as np
 import openmm
 import pytest
@@ -10,6 +12,7 @@ from openmm_cylchain import (
     Filaments,
     FilamentType,
     InputError,
+    TwistWarning,
     analysis,
     capsule_contact_force,
     check_time_step,
@@ -239,6 +242,30 @@ def test_steps_taken_alone_are_those_taken_together():
             context.getIntegrator().step(40 // calls)
         ends.append((positions_of(context), own.twists(0)._value))
     assert np.array_equal(ends[0][0], ends[1][0]) and np.array_equal(ends[0][1], ends[1][1])
+
+
+@pytest.mark.parametrize(("share", "warned"), [(0.98, False), (1.02, True)])
+def test_torque_that_winds_without_end_is_warned_of(share, warned):
+    """Not where the other end turns freely, or what pulls is not known."""
+    pull, torque = 2.0 * KT, share * theory.critical_torque(DNA, 2.0 * KT)
+    caught = []
+    for ends, energy in ((("minus", "plus"), "-pull*z"), (("plus",), "-pull*z"), (("minus", "plus"), "-pull*z^3")):
+        filaments = Filaments(VISCOSITY, TEMPERATURE)
+        filaments.add_straight(DNA, 20, [0, 0, 0], [0, 0, 1], clamped=[0, 1])
+        for end in ends:
+            filaments.add_end_frame(0, end, [0, 0, 1], torque=-torque if end == "plus" else None)
+        _, system, _ = filaments.build()
+        force = openmm.CustomExternalForce(energy)
+        force.addPerParticleParameter("pull")
+        for node, own in ((-1, 4.0 * pull), (-2, -3.0 * pull)):
+            force.addParticle(int(filaments.node_indices[0][node]), [own])
+        system.addForce(force)
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always", TwistWarning)
+            filaments.create_integrator(system, NANOSECOND)
+        caught.append([str(one.message) for one in found if issubclass(one.category, TwistWarning)])
+    assert caught[1:] == [[], []] and len(caught[0]) == warned
+    assert not warned or "8.56 pN, filaments are straight up to" in caught[0][0]
 
 
 def test_step_is_checked():
