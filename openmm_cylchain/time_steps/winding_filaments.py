@@ -2,11 +2,13 @@
 
 import warnings
 from collections.abc import Mapping
+from typing import cast
 
 import numpy as np
 
 from ..errors import TwistWarning
 from ..filaments.collection import FilamentCollection
+from ..filaments.filament_type import FilamentType
 from ..theory.twisted_chain import critical_torque
 from ..units.quantities import PICONEWTON
 from ..units.types import FloatArray
@@ -29,7 +31,7 @@ def warn_of_winding_filaments(filaments: FilamentCollection, constant_forces: Ma
             continue
         tethers = [own for own in filaments.tethers if own.filament == number]
         tension = float(np.median(tensions_of_loads(filament, loads, tethers) @ np.array(frame.direction)))
-        largest = float(critical_torque(filament.type, max(0.0, tension)))
+        largest = float(critical_torque(cast(FilamentType, filament.type), max(0.0, tension)))
         if abs(frame.torque) > largest:
             warnings.warn(
                 f"The {frame.end} end of filament {number} ({filament.type.name}) has a torque of "
