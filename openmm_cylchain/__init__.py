@@ -36,6 +36,7 @@ from .errors import (
     SegmentLengthWarning,
     TimeStepError,
     TimeStepWarning,
+    TwistWarning,
 )
 from .filaments.attachments import Attachment
 from .filaments.body import Body
@@ -158,6 +159,7 @@ __all__ = [
     "TimeStepError",
     "TimeStepWarning",
     "Torus",
+    "TwistWarning",
     "WallForceReporter",
     "WallForces",
     "__version__",

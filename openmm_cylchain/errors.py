@@ -102,3 +102,7 @@ class SegmentLengthWarning(UserWarning):
 
 class TimeStepWarning(UserWarning):
     """A time step that is too long: above a bound, which the message names, or by what a run shows of it."""
+
+
+class TwistWarning(UserWarning):
+    """A torque on an end of a filament that winds it up without end: the message says which, and what to do."""

@@ -12,6 +12,7 @@ from ..units.types import Indices, IntArray, Vectors
 from .attachments import Attachment
 from .body import PlacedBody
 from .filament import Filament, Tether
+from .twist import EndFrame
 
 
 class CollectionInContext(Protocol):
@@ -46,6 +47,9 @@ class FilamentCollection(Protocol):
     def __getitem__(self, index: int) -> Filament: ...
 
     def __iter__(self) -> Iterator[Filament]: ...
+
+    @property
+    def end_frames(self) -> tuple[EndFrame, ...]: ...
 
     @property
     def bodies(self) -> tuple[PlacedBody, ...]: ...

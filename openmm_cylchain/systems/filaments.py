@@ -352,6 +352,9 @@ class Filaments(TiedFilaments):
         SegmentLengthWarning
             If constant forces, or tethers, pull a filament so much that the chain of segments has the extension of the
             wormlike chain at a force that is a tenth off (see ``theory.wlc_share_of_force``).
+        TwistWarning
+            If a filament has a torque at an end under which it is not straight, see ``theory.critical_torque``, with
+            constant forces as the pull on it.
         ContactWarning
             If scheme "implicit" takes contacts for hard ones: energies and forces of contacts and walls are too small.
             If its step is nearly as long: contacts along filaments have up to a sixth too much energy.

@@ -44,7 +44,8 @@ from ..engine_choice import default_scheme
 from ..errors import InputError, InstabilityError
 from ..filaments.collection import require_filaments
 from ..filaments.placement import refuse_coinciding
-from ..filaments.refusals import refuse_growth, refuse_twist
+from ..filaments.refusals import refuse_growth
+from ..filaments.twist import has_twist
 from ..kinetics.binding_force import find_binding_force
 from ..mechanics.flow import Flow
 from ..mechanics.geometry import segment_vectors
@@ -96,6 +97,7 @@ def check_time_step(
     parts: int = 16,
     random_seed: int = 1,
     equilibrium: bool = False,
+    twists: Mapping[int, Numbers] | None = None,
     platform: openmm.Platform | None = None,
     properties: Mapping[str, str] | None = None,
     say: Callable[[str], object] = lambda message: None,
@@ -104,8 +106,9 @@ def check_time_step(
     """Run a System with a step and with a sixteenth of it, and say whether the step is right.
 
     Compared are, for each kind of filament, the mean energies of stretching (per segment) and bending (per joint), of
-    beams per element, the mean square end-to-end distance (of rings: the distance across), and how far the three
-    slowest bending modes and the middle of a filament move in ten steps; how far particles move in them, and from where
+    beams per element, and of twist per joint, the mean square end-to-end distance (of rings: the distance across) and
+    the mean square of the whole twist, and how far the three slowest bending modes and the middle of a filament move in
+    ten steps; how far particles move in them, and from where
     they began; the mean energies of tethers and of each other force of the System, such as walls, contacts and linkers;
     how many hands are bound; and how long bends take to grow where filaments buckle. See ``step_check`` for
     errors, their error bars, the verdicts and what the check cannot see.
@@ -138,6 +141,9 @@ def check_time_step(
         At least 1.
     equilibrium : bool
         Whether filaments were drawn from equilibrium: then the exact averages of free ones count for the verdict.
+    twists : mapping of int to array of angles, optional
+        Of filaments, by their numbers: with which they begin, as ``FilamentsInContext.twists`` returns them. The others
+        begin without twist.
     platform : openmm.Platform, optional
     properties : dict, optional
         Of the platform.
@@ -153,11 +159,11 @@ def check_time_step(
     Raises
     ------
     InputError
-        At a temperature of zero, for filaments that grow, or as ``Filaments.create_integrator``.
+        At a temperature of zero, for filaments that grow, for twists of filaments that have none, or as
+        ``Filaments.create_integrator``.
     """
     require_filaments(filaments)
     refuse_growth(filaments, "the check of a step, which compares the same nodes in two runs,")
-    refuse_twist(filaments, "the check of a step")
     require_kind(system, openmm.System, "system")
     positions = np.asarray(in_units_of(positions, LENGTH, "positions"))
     if positions.shape != (system.getNumParticles(), 3):
@@ -172,6 +178,8 @@ def check_time_step(
     require_callable(say, "say")
     require_callable(stop, "stop")
     _check_platform(platform, properties)
+    if twists is not None:
+        require_kind(twists, Mapping, "twists")
     step = as_step(step_size)
     scheme = default_scheme(filaments.engine) if scheme is None else scheme
     check_scheme(scheme)
@@ -191,6 +199,8 @@ def check_time_step(
     paired = filaments.engine == "compiled"
     arguments = (filaments, probe, positions, step, random_seed, paired, settings, platform, properties)
     runs = [_Run(*arguments, level) for level in (0, parts.bit_length() - 1)]
+    for run in runs:
+        run.set_twists(twists or {})
     start = time.monotonic()
     pair = _Pair(runs, probe, stop)
     windows: list[list[Any]] = []
@@ -341,19 +351,26 @@ class _Run:
         self._before = None
 
     def state(self):
-        # What a run can begin with: positions, the box, and linkers.
+        # What a run can begin with: positions, the box, linkers and twists.
         state = self.context.getState(positions=True)
-        has_linkers = find_binding_force(self._system) is not None
-        linkers = self._filaments.in_context(self.context).linkers() if has_linkers else None
-        return state.getPositions(asNumpy=True), state.getPeriodicBoxVectors(), linkers
+        own = self._filaments.in_context(self.context)
+        linkers = own.linkers() if find_binding_force(self._system) is not None else None
+        twists = {number: own.twists(number) for number, one in enumerate(self._filaments) if has_twist(one.type)}
+        return state.getPositions(asNumpy=True), state.getPeriodicBoxVectors(), linkers, twists
 
     def begin(self, state):
-        positions, box, linkers = state
+        positions, box, linkers, twists = state
         self.context.setPeriodicBoxVectors(*box)
         self.context.setPositions(positions)
         if linkers is not None:
             self._filaments.in_context(self.context).set_linkers(linkers)
+        self.set_twists(twists)
         self._before = None
+
+    def set_twists(self, twists):
+        own = self._filaments.in_context(self.context)
+        for number, values in twists.items():
+            own.set_twists(number, values)
 
     def look(self, probe):
         values, self._before = probe.measure(self.context, self._before)

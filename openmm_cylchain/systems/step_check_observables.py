@@ -13,6 +13,7 @@ from ..couplings.chain_forces import is_chain_force
 from ..couplings.pulling import is_constant_force
 from ..filaments.collection import FilamentCollection
 from ..filaments.filament import Filament
+from ..filaments.twist import has_twist
 from ..kinetics.binding_force import find_binding_force
 from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, IntArray, Scalar
@@ -31,14 +32,19 @@ class Kind:
 
     label: str
     filament: Filament
+    numbers: list[int]
     nodes: IntArray
     control_points: IntArray
 
 
 def _kinds(filaments):
     groups: dict[Any, list[int]] = {}
+    frames: dict[int, list[Any]] = {}
+    for own in filaments.end_frames:
+        frames.setdefault(own.filament, []).append((own.end, own.direction, own.torque, own.angular_velocity))
     for number, one in enumerate(filaments):
         key = (one.type, one.segments, one.closed, one.planar, one.clamped, one.clamped_tangents, one.propulsion)
+        key += tuple(sorted(frames.get(number, []), key=lambda frame: frame[0]))
         groups.setdefault(key, []).append(number)
     kinds: list[Kind] = []
     for numbers in groups.values():
@@ -50,7 +56,7 @@ def _kinds(filaments):
             np.array([own[number] for number in numbers])
             for own in (filaments.node_indices, filaments.control_point_indices)
         )
-        kinds.append(Kind(label, first, nodes, control_points))
+        kinds.append(Kind(label, first, numbers, nodes, control_points))
     return kinds
 
 
@@ -96,6 +102,9 @@ class Probe:
             yield f"{kind.label} bending energy", "k_B T", kind, "bending"
             across = "across" if kind.filament.closed else "end to end"
             yield f"{kind.label} {across}, mean square", "nm^2", kind, "distance"
+            if has_twist(kind.filament.type):
+                yield f"{kind.label} twist energy", "k_B T", kind, "twist"
+                yield f"{kind.label} twist, mean square", "radian^2", kind, "twist"
             for mode in range(1, self._modes(kind) + 1):
                 yield f"{kind.label} bending mode {mode}, change", "nm", kind, "mode"
             yield f"{kind.label} middle, displacement", "nm^2", kind, "middle"
@@ -119,7 +128,7 @@ class Probe:
         values, after = [], []
         with np.errstate(all="ignore"):
             for index, kind in enumerate(self.kinds):
-                own, kept = self._measure_kind(kind, positions, None if before is None else before[index])
+                own, kept = self._measure_kind(kind, context, positions, None if before is None else before[index])
                 values += own
                 after.append(kept)
             if len(self._particles):
@@ -166,7 +175,7 @@ class Probe:
     def _scale(self, kind):
         return math.sqrt(2.0 * kind.filament.type.segment_length / kind.filament.segments)
 
-    def _measure_kind(self, kind, positions, before):
+    def _measure_kind(self, kind, context, positions, before):
         filament, nodes = kind.filament, positions[kind.nodes]
         closed = filament.closed
         vectors = np.diff(nodes, axis=1, append=nodes[:, :1]) if closed else np.diff(nodes, axis=1)
@@ -182,8 +191,18 @@ class Probe:
         energies = filament.energies_along(nodes, positions[kind.control_points], self._temperature)
         # Of a single straight segment, nothing bends.
         values = [*(own.sum(axis=1) / max(1, own.shape[1]) / self._kT for own in energies), np.sum(ends**2, axis=1)]
+        if has_twist(filament.type):
+            values += self._measure_twist(kind, context)
         values += [*np.sum(moved[0] ** 2, axis=2), np.sum(moved[1] ** 2, axis=1)]
         return values, (amplitudes, middle)
+
+    def _measure_twist(self, kind, context):
+        own = self._filaments.in_context(context)
+        twists = np.array([own.twists(number)._value for number in kind.numbers])
+        if not kind.filament.closed:
+            twists = twists[:, 1:-1]
+        energies = 0.5 * kind.filament.type.twist_stiffness * np.sum(twists**2, axis=1) / max(1, twists.shape[1])
+        return [energies / self._kT, np.sum(twists, axis=1) ** 2]
 
     def _tether_energy(self, positions):
         energy = 0.0

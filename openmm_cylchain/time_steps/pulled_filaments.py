@@ -6,7 +6,7 @@ leave out bends that a wormlike chain would have, and the chain is longer than i
 
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -15,7 +15,7 @@ import scipy
 
 from ..errors import SegmentLengthWarning
 from ..filaments.collection import FilamentCollection
-from ..filaments.filament import Tether
+from ..filaments.filament import Filament, Tether
 from ..filaments.filament_type import FilamentType
 from ..filaments.straight_segments import STRAIGHT_SEGMENTS
 from ..theory.force_extension import marko_siggia_extension, wlc_share_of_force
@@ -87,9 +87,17 @@ def _pulls(filaments, temperature, constant_forces):
 
 
 def _of_loads(filament, loads, tethers):
-    # Of what constant forces add up to on one side of each segment.
     if not loads:
         return 0.0
+    tension = tensions_of_loads(filament, loads, tethers)
+    along = filament.positions[-1] - filament.positions[0]
+    # Forces on the ends that press them together do not pull.
+    lengths = np.linalg.norm(tension, axis=1)
+    return float(np.max(np.where(tension @ along > -0.5 * lengths * np.linalg.norm(along), lengths, 0.0)))
+
+
+def tensions_of_loads(filament: Filament, loads: Mapping[int, FloatArray], tethers: Sequence[Tether]) -> FloatArray:
+    """What constant forces (3,) on nodes, by their numbers, add up to on one side of each segment: (segments, 3)."""
     count = len(filament.positions)
     forces = np.zeros((count, 3))
     for node, load in loads.items():
@@ -101,15 +109,10 @@ def _of_loads(filament, loads, tethers):
     fixed = list(filament.clamped)
     held[fixed] = _HELD * stiffness.max()
     if held.any():
-        tension = stiffness[:, None] * np.diff(displacements(stiffness, held, forces), axis=0)
-    else:
-        friction = np.full(count, 1.0)
-        friction[[0, -1]] = 0.5
-        tension = -np.cumsum(forces - np.outer(friction / friction.sum(), forces.sum(axis=0)), axis=0)[:-1]
-    along = filament.positions[-1] - filament.positions[0]
-    # Forces on the ends that press them together do not pull.
-    lengths = np.linalg.norm(tension, axis=1)
-    return float(np.max(np.where(tension @ along > -0.5 * lengths * np.linalg.norm(along), lengths, 0.0)))
+        return stiffness[:, None] * np.diff(displacements(stiffness, held, forces), axis=0)
+    friction = np.full(count, 1.0)
+    friction[[0, -1]] = 0.5
+    return -np.cumsum(forces - np.outer(friction / friction.sum(), forces.sum(axis=0)), axis=0)[:-1]
 
 
 def _of_held_nodes(filament, tethers, temperature, known):

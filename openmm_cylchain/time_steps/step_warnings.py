@@ -23,6 +23,7 @@ from .recommended_step import fene_steps, recommended_time_step
 from .schemes import EXPLICIT_SCHEMES, IMPLICIT_SCHEMES
 from .stability import stability_bounds
 from .time_step import IDLE, RECOMMENDED_STRAIN, TimeStep, as_step, strain_rate
+from .winding_filaments import warn_of_winding_filaments
 
 _LARGEST_STRAIN = 0.06
 _LARGEST_ADVANCE = 0.5
@@ -40,8 +41,8 @@ def warn_of_long_step(
 ) -> None:
     """Warn (TimeStepWarning) of a step in ps that is too long for filaments, a flow or the forces of a System.
 
-    And (SegmentLengthWarning) of segments that are too long for forces that pull them, and (ContactWarning) of contacts
-    that the step takes for hard ones.
+    And (SegmentLengthWarning) of segments that are too long for forces that pull them, (TwistWarning) of torques that
+    these do not bear, and (ContactWarning) of contacts that the step takes for hard ones.
     """
     warn_if_strained(step, flow)
     solvent = filaments.viscosity, filaments.temperature
@@ -59,6 +60,7 @@ def warn_of_long_step(
     warn_if_growth_is_not_resolved(filaments, system, step)
     warn_if_buckling_is_not_resolved(steps_of_buckling(filaments, scheme, forces.constant_forces), step)
     warn_of_pulled_filaments(filaments, temperature, forces.constant_forces)
+    warn_of_winding_filaments(filaments, forces.constant_forces)
     warn_of_hard_contacts(filaments, system, step, scheme, particle_friction, coupled)
 
 

@@ -180,6 +180,9 @@ void ContactGaps::follow(NearPair& own, bool again) const {
         const int count = search->evaluate(pair, begun, begun, contacts);
         own.touchedAtStart = count > 0;
         own.start = findPairGap(search->getSegments(pair, false), contacts, count, radii);
+        // What a neighbor touched here may be this pair's at the end: then it begins as deep as it does.
+        if (count == 0 && own.start.gap == 0)
+            own.start.gap = sqrt(findNearestPoints(search->getSegments(pair, false)).squared)-radii;
         own.gap.stiffness = stiffness;
         own.gap.response = responsesOfCapsules[pair.a]+responsesOfCapsules[pair.b];
         own.depth = candidates.placeHardSurface(own.pair, own.start.gap, own.gap);
@@ -188,7 +191,7 @@ void ContactGaps::follow(NearPair& own, bool again) const {
     // What touches a neighbor at the start and at the end is no gap of this pair.
     own.gap.present = count > 0 || own.touchedAtStart;
     ContactPair last = pair;
-    if (count == 0 && own.touchedAtStart && own.gap.law == GapLaw::Spring)
+    if (count == 0 && own.touchedAtStart)
         count = findContactsBeside(pair, last, contacts);
     own.last[0] = last.a;
     own.last[1] = last.b;
@@ -263,7 +266,7 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
     });
     vector<const NearPair*> deep;
     for (const NearPair& own : near)
-        if (own.touchedAtStart && own.gap.law == GapLaw::Spring)
+        if (own.touchedAtStart && (own.gap.law == GapLaw::Spring || own.hasGoneOn(candidates.get(own.pair))))
             deep.push_back(&own);
     for (NearPair& own : near)
         if (own.number < 0 && own.hasMoved && own.gap.numLevers > 0 && own.gap.present && mayClose(own.gap) &&

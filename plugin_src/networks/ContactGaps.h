@@ -77,6 +77,10 @@ private:
         double fractions[4][2] = {}, offset = 0;
         /** How often it has been found again when all had converged. */
         int timesAgain = 0;
+        /** Whether the contact that its pair had is that of segments beside it in the end. */
+        bool hasGoneOn(const ContactPair& own) const {
+            return last[0] != own.a || last[1] != own.b;
+        }
     };
     static PairGap findPairGap(const SegmentPair& pair, const Contact* contacts, int count, double radii);
     void follow(NearPair& near, bool again = false) const;

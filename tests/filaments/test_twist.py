@@ -1,11 +1,23 @@
 """Filaments with twist: what they are given, their equilibrium at any step, linking numbers, and what is refused."""
 
+import warnings
+
 import numpy as np
 import openmm
 import pytest
 from openmm import unit
 
-from openmm_cylchain import F_ACTIN, Filaments, FilamentType, InputError, analysis, capsule_contact_force, theory
+from openmm_cylchain import (
+    F_ACTIN,
+    Filaments,
+    FilamentType,
+    InputError,
+    TwistWarning,
+    analysis,
+    capsule_contact_force,
+    check_time_step,
+    theory,
+)
 from openmm_cylchain.engines.compiled import CylinderChainForce
 from openmm_cylchain.units.quantities import BOLTZMANN
 from support.contexts import new_context, positions_of
@@ -230,6 +242,58 @@ def test_steps_taken_alone_are_those_taken_together():
             context.getIntegrator().step(40 // calls)
         ends.append((positions_of(context), own.twists(0)._value))
     assert np.array_equal(ends[0][0], ends[1][0]) and np.array_equal(ends[0][1], ends[1][1])
+
+
+@pytest.mark.parametrize(("share", "warned"), [(0.98, False), (1.02, True)])
+def test_torque_that_winds_without_end_is_warned_of(share, warned):
+    """Not where the other end turns freely, or what pulls is not known."""
+    pull, torque = 2.0 * KT, share * theory.critical_torque(DNA, 2.0 * KT)
+    caught = []
+    for ends, energy in ((("minus", "plus"), "-pull*z"), (("plus",), "-pull*z"), (("minus", "plus"), "-pull*z^3")):
+        filaments = Filaments(VISCOSITY, TEMPERATURE)
+        filaments.add_straight(DNA, 20, [0, 0, 0], [0, 0, 1], clamped=[0, 1])
+        for end in ends:
+            filaments.add_end_frame(0, end, [0, 0, 1], torque=-torque if end == "plus" else None)
+        _, system, _ = filaments.build()
+        force = openmm.CustomExternalForce(energy)
+        force.addPerParticleParameter("pull")
+        for node, own in ((-1, 4.0 * pull), (-2, -3.0 * pull)):
+            force.addParticle(int(filaments.node_indices[0][node]), [own])
+        system.addForce(force)
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always", TwistWarning)
+            filaments.create_integrator(system, NANOSECOND)
+        caught.append([str(one.message) for one in found if issubclass(one.category, TwistWarning)])
+    assert caught[1:] == [[], []] and len(caught[0]) == warned
+    assert not warned or "8.56 pN, filaments are straight up to" in caught[0][0]
+
+
+def test_step_is_checked():
+    """Of free chains and of rings that begin, in each window, with the turns that they have."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    for number in range(8):
+        filaments.add_equilibrium(DNA, 8, number)
+    rings = [filaments.add_ring(DNA, 16, [200.0 * number, 0, 0]) for number in range(2)]
+    _, system, positions = filaments.build()
+    twists = {ring: np.full(16, np.pi / 16) for ring in rings}
+    check = check_time_step(filaments, system, positions, NANOSECOND, frames=48, twists=twists)
+    free, closed = check["DNA x 8 twist, mean square"], check["DNA x 16 twist, mean square"]
+    assert check["DNA x 8 twist energy"].values == pytest.approx((0.5, 0.5), rel=0.25)
+    # Some of the half turn of rings is writhe.
+    assert closed.verdict == "right" and all(0.5 < value / np.pi**2 < 1.0 for value in closed.values)
+    # Both runs follow one path.
+    assert free.unpaired_standard_error > 2 * free.standard_error
+    filaments = held_chains(2, 4)
+    filaments.add_straight(DNA, 4, [300, 0, 0], [0, 0, 1])
+    _, system, positions = filaments.build()
+    check = check_time_step(filaments, system, positions, NANOSECOND, frames=2)
+    assert {one.name for one in check.observables if "twist, " in one.name} == {
+        "DNA x 4 twist, mean square",
+        "DNA x 4 (filament 2) twist, mean square",
+    }
+    for wrong, message in (([1.0], "twists"), ({0: np.zeros(4)}, "shape"), ({3: np.zeros(5)}, "does not exist")):
+        with pytest.raises(InputError, match=message):
+            check_time_step(filaments, system, positions, NANOSECOND, frames=2, twists=wrong)
 
 
 # Linking numbers

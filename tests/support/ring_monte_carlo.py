@@ -48,31 +48,19 @@ class Ring:
         return first, second, *contact_distances(between, along[:, first], along[:, second])
 
     def contact_energies(self, nodes):
-        """(copies,). What a segment and its neighbour both touch at their joint counts once."""
+        """(copies,). A segment touches another one where no neighbour of either is nearer: joints count once."""
         first, second, distances, parallel = self.pairs(nodes)
-        number = np.full((self.segments, self.segments), -1)
-        number[first, second] = number[second, first] = np.arange(len(first))
+        apart = np.full((len(nodes), self.segments, self.segments), np.inf)
+        apart[:, first, second] = apart[:, second, first] = distances[0]
+        nearest = np.full(apart.shape, True)
+        for axis in (1, 2):
+            # Of two that are as near as each other, at their joint, the first one counts.
+            nearest &= apart < np.roll(apart, 1, axis) - 1e-9
+            nearest &= apart <= np.roll(apart, -1, axis) + 1e-9
         overlaps = np.maximum(self.diameter - distances, 0.0)
-        squares = np.where(parallel, 0.5 * (overlaps[1] ** 2 + overlaps[2] ** 2), overlaps[0] ** 2)
-        for copy, pair in zip(*np.nonzero((overlaps[0] > 0.0) & ~parallel)):
-            own = distances[0, copy, pair]
-            for one, other in ((first[pair], second[pair]), (second[pair], first[pair])):
-                for step in (-1, 1):
-                    beside = number[(one + step) % self.segments, other]
-                    if beside < 0 or not self._ends_at(nodes[copy], one, other, step, own):
-                        continue
-                    # The neighbour comes nearer, or has the same place at its other end: that one counts.
-                    if distances[0, copy, beside] < own - 1e-9 or (step == -1):
-                        squares[copy, pair] = 0.0
+        one = np.where(nearest[:, first, second], overlaps[0] ** 2, 0.0)
+        squares = np.where(parallel, 0.5 * (overlaps[1] ** 2 + overlaps[2] ** 2), one)
         return 0.5 * self.contact * squares.sum(axis=1)
-
-    def _ends_at(self, nodes, one, other, step, distance):
-        # Whether a segment is nearest to another one where it ends.
-        node = nodes[(one + (step == 1)) % self.segments]
-        start = nodes[other]
-        along = nodes[(other + 1) % self.segments] - start
-        fraction = np.clip((node - start) @ along / (along @ along), 0.0, 1.0)
-        return np.linalg.norm(node - start - fraction * along) <= distance + 1e-9
 
     def observe(self, nodes):
         """Energies of contacts and of bends, and numbers of pairs of segments by DISTANCES: an array (copies, 4)."""
@@ -84,6 +72,8 @@ class Ring:
 
 class RingMonteCarlo:
     """Metropolis moves of copies of a Ring without its contacts: parts of it turn, and nodes move."""
+
+    largest_turn = 10.0**0.5
 
     def __init__(self, ring, nodes, seed):
         self.ring, self.nodes = ring, np.array(nodes, dtype=float)
@@ -110,7 +100,8 @@ class RingMonteCarlo:
         start = self.nodes[:, first, None]
         axis = self.nodes[:, (first + count + 1) % segments, None] - start
         axis /= np.linalg.norm(axis, axis=2)[..., None]
-        angle = (10.0 ** generator.uniform(-1.0, 0.5, copies) * generator.normal(size=copies))[:, None, None]
+        angle = self.largest_turn * 10.0 ** generator.uniform(-1.5, 0.0, copies) * generator.normal(size=copies)
+        angle = angle[:, None, None]
         out = self.nodes[:, turned] - start
         parallel = axis * (out * axis).sum(axis=2)[..., None]
         moved = self.nodes.copy()
