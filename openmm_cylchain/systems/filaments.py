@@ -353,7 +353,8 @@ class Filaments(TiedFilaments):
             filaments; or if FENE lengths have too much energy at it (``timestep.fene_steps``).
         SegmentLengthWarning
             If constant forces, or tethers, pull a filament so much that the chain of segments has the extension of the
-            wormlike chain at a force that is a tenth off (see ``theory.wlc_share_of_force``).
+            wormlike chain at a force that is a tenth off (see ``theory.wlc_share_of_force``), or more than it is
+            calibrated for.
         ContactWarning
             If scheme "implicit" takes contacts for hard ones: energies and forces of contacts and walls are too small.
             If its step is nearly as long: contacts along filaments have up to a sixth too much energy.
