@@ -43,7 +43,6 @@ CASES = [
     ("force_extension", "dna", 200, 100, 24 * 21, 24 * 20),
     ("magnetic_tweezers", "tweezers", 200, 100, 22 * 41, 22 * 40),
     ("supercoiled_plasmid", "plasmids", 60, 60, 3 * 120, 3 * 120),
-    ("cyclisation", "molecules", 60, 60, 30 * (3 * 41 + 2 * 33), 30 * (3 * 40 + 2 * 32)),
 ]
 # The others are slow tests.
 AT_ONCE = (

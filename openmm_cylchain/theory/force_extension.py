@@ -261,7 +261,8 @@ def wlc_share_of_force(filament_type: FilamentType, force: Numbers, temperature:
     return np.vectorize(share, otypes=[float])(each_not_negative(force, FORCE, "force"))[()]
 
 
-def require_not_calibrated(filament_type):
+def require_not_calibrated(filament_type: FilamentType) -> None:
+    """Raise InputError if a type is one of ``calibrated_up_to_force``, or of segments that are not straight."""
     require_straight_segments(filament_type)
     if filament_type.contour_per_segment is not None:
         raise InputError(
