@@ -98,7 +98,9 @@ class FilamentType(ChainType):
         is cut into shorter segments; with the other two it converges.
     contour_per_segment : length, optional
         Length of the continuous filament that a segment stands for, if it is not segment_length:
-        ``theory.calibrated_to_force`` makes such types.
+        ``theory.calibrated_up_to_force`` makes such types.
+    calibrated_force : force, optional
+        Up to which such a type follows the wormlike chain.
     twist_persistence_length : length with temperature : temperature
         The length l_t = C/k_B T over which twist is lost: the frames of two places of the free filament at a distance s
         along it have ``<cos(turn)> = exp(-s/2 l_t)``. Without it, and without a torsional rigidity, there is no twist.
@@ -152,6 +154,7 @@ class FilamentType(ChainType):
     mass_per_length: float = 3500.0
     element: str = "straight"
     contour_per_segment: float | None = None
+    calibrated_force: float | None = None
     torsional_rigidity: float | None = None
     twist_persistence_length: float | None = field(default=None, repr=False)
 
@@ -178,6 +181,7 @@ class FilamentType(ChainType):
             mass_per_length: Scalar = 3500.0,
             element: str = "straight",
             contour_per_segment: Scalar | None = None,
+            calibrated_force: Scalar | None = None,
             torsional_rigidity: Scalar | None = None,
             twist_persistence_length: Scalar | None = None,
         ) -> None: ...
@@ -188,6 +192,7 @@ class FilamentType(ChainType):
             ("diameter", LENGTH),
             ("segment_length", LENGTH),
             ("contour_per_segment", LENGTH),
+            ("calibrated_force", FORCE),
             ("mass_per_length", MASS / LENGTH),
             ("maximum_extension", LENGTH),
             ("extension_relaxation_time", TIME),
@@ -213,6 +218,8 @@ class FilamentType(ChainType):
             self._fail("give either stretching_stiffness (of one segment) or stretching_modulus (EA).")
         if self.extension_relaxation_time is not None and self.extensional_friction is not None:
             self._fail("give either extension_relaxation_time or extensional_friction, not both.")
+        if (self.contour_per_segment is None) != (self.calibrated_force is None):
+            self._fail("contour_per_segment and calibrated_force belong together.")
         self._check_choices()
         if not isinstance(self.end_corrections, EndCorrections):
             self._fail("end_corrections must be an EndCorrections(parallel, perpendicular, rotational).")
@@ -524,10 +531,10 @@ class FilamentType(ChainType):
         becomes softer or stiffer), extension_relaxation_time, end corrections, friction_length, mass per length.
 
         Raises InputError for segments too short for their friction, see ``friction_length``, and for a type that
-        ``theory.calibrated_to_force`` made: cut first, and calibrate then.
+        ``theory.calibrated_up_to_force`` made: cut first, and calibrate then.
         """
         if self.contour_per_segment is not None:
-            self._fail("it is calibrated to a force in segments of its own length: cut first, and calibrate then.")
+            self._fail("it is calibrated up to a force in segments of its own length: cut first, and calibrate then.")
         length = positive(segment_length, LENGTH, f"segment_length of filament type {self.name!r}")
         scale = length / self.segment_length
         return replace(

@@ -51,7 +51,7 @@ Science 1996, 271, 795 report, 1000 to 1200 pN depending on salt. Affine extensi
 
 Tangents decorrelate over 43.3 nm with segments of any length. A segment lengthens by 2 k_B T/EA = 0.008 nm on average
 as it fluctuates, however short it is: by 1 % with segments of 0.8 nm. Under forces above 1 pN the chain is longer than
-a wormlike chain, however it is cut: ``theory.calibrated_to_force`` has by how much, and makes a type that is not. The
+a wormlike chain, however it is cut: ``theory.calibrated_up_to_force`` makes a type that is one. The
 friction of a length of DNA is that of the paper's segments of 8 nm, or of longer ones, so that shorter segments, down
 to 1 nm and less, make up the same filament. It leaves out the flow that one segment makes at another. Of a whole rod,
 up to a persistence length or so, ``friction_length="filament"`` is nearer to what is measured.

@@ -351,7 +351,8 @@ class Filaments(TiedFilaments):
             filaments; or if FENE lengths have too much energy at it (``timestep.fene_steps``).
         SegmentLengthWarning
             If constant forces, or tethers, pull a filament so much that the chain of segments has the extension of the
-            wormlike chain at a force that is a tenth off (see ``theory.wlc_share_of_force``).
+            wormlike chain at a force that is a tenth off (see ``theory.wlc_share_of_force``), or more than it is
+            calibrated for.
         TwistWarning
             If a filament has a torque at an end under which it is not straight, see ``theory.critical_torque``, with
             constant forces as the pull on it.

@@ -28,6 +28,7 @@ from .beam_elements import (
     beam_stretching_energy_mean,
     beam_tangent_correlation,
 )
+from .calibrated_chain import calibrated_up_to_force
 from .discrete_chain import (
     chain_bending_mode_variance,
     chain_mean_energies,
@@ -40,7 +41,6 @@ from .discrete_chain import (
 )
 from .energies import bending_energy_mean, bending_energy_variance, stretching_energy_mean, stretching_energy_variance
 from .force_extension import (
-    calibrated_to_force,
     chain_extension,
     crossover_force,
     effective_spring_constant,
@@ -96,7 +96,7 @@ __all__ = [
     "bending_energy_mean",
     "bending_energy_variance",
     "bending_mode_variance",
-    "calibrated_to_force",
+    "calibrated_up_to_force",
     "chain_bending_mode_variance",
     "chain_extension",
     "chain_mean_energies",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -12,7 +11,7 @@ from ..errors import InputError
 from ..filaments.equilibrium import JointAngleDistribution
 from ..filaments.filament_type import FilamentType
 from ..mechanics.quadrature import gauss_points
-from ..units.quantities import DIMENSIONLESS, FORCE, LENGTH, PICONEWTON, STIFFNESS, in_units_of, positive, whole_number
+from ..units.quantities import DIMENSIONLESS, FORCE, LENGTH, STIFFNESS, in_units_of, positive, whole_number
 from ..units.types import FloatOrArray, Numbers, Scalar
 from .arguments import each_not_negative, number_in_memory, require_straight_segments, thermal_energy_above_zero
 
@@ -228,11 +227,10 @@ def wlc_share_of_force(filament_type: FilamentType, force: Numbers, temperature:
 
     Segments take two things from a wormlike chain. Bends between their ends are missing, so that a large force leaves
     too little of them; and, since a length has the weight l^2, each is longer than l0 by 2 k_B T/k, which adds up as
-    they become shorter. With the length b of the WLC that a segment stands for, f = F lp/k_B T and EA = k b, a large
-    force leaves of the relative extension
+    they become shorter. With f = F lp/k_B T and EA = k l0, a large force leaves of the relative extension
 
         WLC: 1 - 1/(2 sqrt(f)) + F/EA
-        chain: (l0/b + 2 k_B T/(EA l0)) (1 - 1/(2 sqrt(f + (F b/2 k_B T)^2))) + F/EA
+        chain: (1 + 2 k_B T/(EA l0)) (1 - 1/(2 sqrt(f + (F l0/2 k_B T)^2))) + F/EA
 
     and it is the force at which the second is what the first is at F. Good to 0.05 for DNA; ``long_chain_extension``
     and ``wlc_relative_extension`` are exact.
@@ -240,18 +238,19 @@ def wlc_share_of_force(filament_type: FilamentType, force: Numbers, temperature:
     Parameters
     ----------
     filament_type : FilamentType
+        Not one of ``calibrated_up_to_force``.
     force : force, number or array, not negative
     temperature : temperature, above zero
     """
-    require_straight_segments(filament_type)
+    require_not_calibrated(filament_type)
     kT = thermal_energy_above_zero(temperature)
-    rest, contour = filament_type.segment_length, _contour(filament_type)
-    rigidity, modulus = filament_type.bending_rigidity * contour / rest, filament_type.segment_stiffness * contour
-    longest = rest / contour + 2.0 * kT / (modulus * rest)
+    length, rigidity = filament_type.segment_length, filament_type.bending_rigidity
+    modulus = filament_type.segment_stiffness * length
+    longest = 1.0 + 2.0 * kT / (modulus * length)
 
     def extension(force):
         stiff = math.sqrt(force * rigidity) / kT
-        return longest * (1.0 - 0.5 / math.hypot(stiff, 0.5 * force * contour / kT)) + force / modulus
+        return longest * (1.0 - 0.5 / math.hypot(stiff, 0.5 * force * length / kT)) + force / modulus
 
     def share(force):
         if force == 0.0 or rigidity == 0.0:
@@ -262,82 +261,14 @@ def wlc_share_of_force(filament_type: FilamentType, force: Numbers, temperature:
     return np.vectorize(share, otypes=[float])(each_not_negative(force, FORCE, "force"))[()]
 
 
-def calibrated_to_force(filament_type: FilamentType, force: Scalar, temperature: Scalar) -> FilamentType:
-    """A type whose long chain has, at one force, exactly the extension of the wormlike chain, and nearly so at others.
-
-    Segments are shorter at rest than the length b of the filament that each stands for, ``contour_per_segment``, so
-    that ``long_chain_extension(calibrated, F) = b wlc_relative_extension(F, lp, T, EA)``. They bend and stretch as
-    before: tangents decorrelate over lp = a/k_B T along the filament, and EA = k b. N segments are N b of it.
-
-    Of ``DSDNA``, the force for the extension of the wormlike chain, over the one that the wormlike chain needs, is
-
-    ======================== ====== ====== ====== ====== ====== ======
-    segments                 0.1 pN 1 pN   5 pN   10 pN  20 pN  40 pN
-    ======================== ====== ====== ====== ====== ====== ======
-    8 nm, not calibrated     0.99   0.96   0.80   0.72   0.67   0.71
-    2 nm, not calibrated     0.99   0.96   0.90   0.87   0.86   0.88
-    8 nm, calibrated at 20   1.04   1.13   1.10   1.04   1      1.00
-    8 nm, calibrated at 5    1.02   1.07   1      0.93   0.89   0.91
-    4 nm, calibrated at 20   1.02   1.06   1.07   1.04   1      0.97
-    2 nm, calibrated at 20   1.00   1.02   1.02   1.01   1      0.99
-    1 nm, calibrated at 20   1.00   1.00   1.00   1.00   1      1.00
-    ======================== ====== ====== ====== ====== ====== ======
-
-    Parameters
-    ----------
-    filament_type : FilamentType
-        Of straight segments with harmonic lengths, as it is cut.
-    force : force, above zero
-        F.
-    temperature : temperature, above zero
-
-    Returns
-    -------
-    FilamentType
-
-    Raises
-    ------
-    InputError
-        For beads, beam elements, FENE lengths, a type that does not bend or is calibrated already, or segments that
-        are too long or too soft: where the rest length would be less than half of b.
-    """
+def require_not_calibrated(filament_type: FilamentType) -> None:
+    """Raise InputError if a type is one of ``calibrated_up_to_force``, or of segments that are not straight."""
     require_straight_segments(filament_type)
-    name = f"Filament type {filament_type.name!r}"
-    force = positive(force, FORCE, "force")
-    if filament_type.maximum_extension is not None or filament_type.bending_rigidity == 0.0:
-        raise InputError(f"{name}: FENE lengths, or joints that do not bend back, are those of no wormlike chain.")
     if filament_type.contour_per_segment is not None:
-        raise InputError(f"{name} is calibrated to a force already: take the type that it was made of.")
-    contour, stiffness = filament_type.segment_length, filament_type.segment_stiffness
-    persistence_length = filament_type.persistence_length_at(temperature)
-    wanted = contour * wlc_relative_extension(force, persistence_length, temperature, stiffness * contour)
-
-    def shortened(share):
-        # With the same stiffnesses of joints and of lengths.
-        kept = {} if filament_type.stretching_modulus is None else {"stretching_modulus": stiffness * share * contour}
-        rigidity = filament_type.bending_rigidity * share
-        return replace(
-            filament_type,
-            segment_length=share * contour,
-            bending_rigidity=rigidity,
-            contour_per_segment=contour,
-            **kept,
-        )
-
-    def excess(share):
-        return long_chain_extension(shortened(share), force, temperature) - wanted
-
-    if excess(0.5) > 0.0:
         raise InputError(
-            f"{name}: its segments of {contour:g} nm are too long, or too soft, for the extension of a wormlike chain "
-            f"at {force / PICONEWTON:.3g} pN."
+            f"Filament type {filament_type.name!r} is calibrated up to a force already: take the type that it was "
+            "made of."
         )
-    return shortened(scipy.optimize.brentq(excess, 0.5, 1.1, xtol=1e-9))
-
-
-def _contour(filament_type):
-    given = filament_type.contour_per_segment
-    return filament_type.segment_length if given is None else given
 
 
 def linear_force(extension: Numbers, contour_length: Scalar, segment_stiffness: Scalar, segments: int) -> FloatOrArray:

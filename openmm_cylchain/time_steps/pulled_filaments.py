@@ -24,6 +24,7 @@ from ..units.types import FloatArray
 from .buckling_step import displacements
 
 _LARGEST_ERROR = 0.1
+_BEYOND = 0.05
 _HELD = 1e6
 
 
@@ -32,36 +33,44 @@ def warn_of_pulled_filaments(
 ) -> None:
     """Issue a SegmentLengthWarning, for each type, of the filament whose force is most off, if by more than a tenth.
 
-    Filaments are as they begin. At a temperature of zero, nothing bends. Constant forces, (3,) in kJ/(mol nm), are by
-    the particle that they act on.
+    Of a type that is calibrated up to a force, of the one that is pulled most, if by more. Filaments are as they begin.
+    At a temperature of zero, nothing bends. Constant forces, (3,) in kJ/(mol nm), are by the particle that they act on.
     """
     if temperature == 0.0:
         return
     worst: dict[str, tuple[float, float, FilamentType, int]] = {}
     for number, (kind, force) in _pulls(filaments, temperature, constant_forces).items():
+        error = _error(kind, force, temperature)
+        if error > worst.get(kind.name, (0.0,))[0]:
+            worst[kind.name] = error, force, kind, number
+    for _, force, kind, number in worst.values():
+        _warn(kind, number, force, temperature)
+
+
+def _error(kind, force, temperature):
+    # Zero where it is no reason to warn.
+    if kind.calibrated_force is not None:
+        return max(0.0, math.log(force / kind.calibrated_force) - _BEYOND)
+    share = float(wlc_share_of_force(kind, force, temperature))
+    return abs(math.log(share)) if abs(share - 1.0) > _LARGEST_ERROR else 0.0
+
+
+def _warn(kind, number, force, temperature):
+    text = f"Filament {number} ({kind.name}) is pulled with {force / PICONEWTON:.3g} pN"
+    if kind.calibrated_force is not None:
+        text += (
+            f", but calibrated up to {kind.calibrated_force / PICONEWTON:.3g} pN: calibrate it up to a larger force."
+        )
+    else:
+        bend = math.sqrt(kind.bending_rigidity / force)
         share = float(wlc_share_of_force(kind, force, temperature))
-        if abs(math.log(share)) > abs(math.log(worst.get(kind.name, (1.0,))[0])):
-            worst[kind.name] = share, force, kind, number
-    for name, (share, force, kind, number) in worst.items():
-        if abs(share - 1.0) > _LARGEST_ERROR:
-            _warn(kind, name, number, share, force)
-
-
-def _warn(kind, name, number, share, force):
-    bend = math.sqrt(kind.bending_rigidity / force)
-    remedy = (
-        "It is calibrated to another force."
-        if kind.contour_per_segment is not None
-        else "Take shorter segments and theory.calibrated_to_force (in a file: calibrated_to_force): it makes a type "
-        "that is right at one force."
-    )
-    warnings.warn(
-        f"Filament {number} ({name}) is pulled with {force / PICONEWTON:.3g} pN, under which a wormlike chain bends "
-        f"over (k_BT l_p/F)^(1/2) = {bend:.3g} nm. In segments of {kind.segment_length:.4g} nm, a long filament has "
-        f"the extension of the wormlike chain at {share:.2f} of the force. {remedy}",
-        SegmentLengthWarning,
-        stacklevel=4,
-    )
+        text += (
+            f", under which a wormlike chain bends over (k_BT l_p/F)^(1/2) = {bend:.3g} nm. In segments of "
+            f"{kind.segment_length:.4g} nm, a long filament has the extension of the wormlike chain at {share:.2f} of "
+            "the force. Take theory.calibrated_up_to_force (in a file: calibrated_up_to_force), and shorter segments "
+            "where it says so."
+        )
+    warnings.warn(text, SegmentLengthWarning, stacklevel=4)
 
 
 def _pulls(filaments, temperature, constant_forces):

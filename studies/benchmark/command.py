@@ -48,11 +48,15 @@ def add_command(commands):
         "spindle", help="200 microtubules that turn over in a plane, 6000 kinesin-5 and 3000 dynein, some minutes"
     )
     spindle.set_defaults(command=_benchmark_spindle)
+    dna = benchmarks.add_parser(
+        "dna", help="a supercoiled plasmid, and 100 000 segments with extruders beside polychrom's way, many minutes"
+    )
+    dna.set_defaults(command=_benchmark_dna)
     platforms = benchmarks.add_parser(
         "platforms", help="filaments, alone and among particles, on each platform and in each precision, many minutes"
     )
     platforms.set_defaults(command=_benchmark_platforms)
-    of_networks = (networks, kinetics, turnover, spindle, platforms)
+    of_networks = (networks, kinetics, turnover, spindle, dna, platforms)
     for benchmark in (engines, scaling, time_step, bead_spring, base_pairs, *of_networks):
         benchmark.add_argument("--quick", action="store_true", help="a rough measurement within a minute")
         benchmark.add_argument("--json", metavar="FILE", help="write machine, settings and results to FILE as well")
@@ -123,6 +127,12 @@ def _benchmark_spindle(options):
     from .spindle import FULL, QUICK, benchmark_spindle
 
     _benchmark(options, lambda say: benchmark_spindle(QUICK if options.quick else FULL, say))
+
+
+def _benchmark_dna(options):
+    from .dna import FULL, QUICK, benchmark_dna
+
+    _benchmark(options, lambda say: benchmark_dna(QUICK if options.quick else FULL, say))
 
 
 def _benchmark_platforms(options):

@@ -25,7 +25,14 @@ PYTHON_PAGES = [page for page in PAGES if blocks_of(page, "python") and page.nam
 # Pages whose blocks take more than a few seconds.
 SLOW = {
     f"docs/tutorials/{name}.md"
-    for name in ("buckling", "contractile_bundle", "dna_persistence_length", "force_extension", "loop_extrusion")
+    for name in (
+        "buckling",
+        "contractile_bundle",
+        "dna_persistence_length",
+        "force_extension",
+        "loop_extrusion",
+        "magnetic_tweezers",
+    )
 }
 
 FILAMENTS_IN_A_SYSTEM = """

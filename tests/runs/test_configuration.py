@@ -334,16 +334,16 @@ def test_mistakes_in_chains_of_beads_are_named(lines, fragment):
     assert fragment in str(caught.value)
 
 
-def test_a_type_that_is_calibrated_to_a_force():
-    lines = 'type = "DSDNA"\nsegment_length = "4 nm"\ncalibrated_to_force = "20 pN"\nsegments = 7\n'
+def test_a_type_that_is_calibrated_up_to_a_force():
+    lines = 'type = "DSDNA"\nsegment_length = "4 nm"\ncalibrated_up_to_force = "20 pN"\nsegments = 7\n'
     (kind,) = {one.type for one in parse(filament="[[filament]]\n" + lines).filaments}
-    expected = theory.calibrated_to_force(DSDNA.with_segment_length(4.0), 20 * 0.602214076, 310.0)
+    expected = theory.calibrated_up_to_force(DSDNA.with_segment_length(4.0), 20 * 0.602214076, 310.0)
     assert kind == expected and kind.contour_per_segment == 4.0 and kind.segment_length < 4.0
     for mistake in ("20 nm", "0 pN"):
-        with pytest.raises(InputError, match="calibrated_to_force"):
+        with pytest.raises(InputError, match="calibrated_up_to_force"):
             parse(filament="[[filament]]\n" + lines.replace("20 pN", mistake))
-    with pytest.raises(InputError, match="calibrated_to_force belongs to a chain of cylinders"):
-        beads('stretching_modulus = "1 pN"\ncalibrated_to_force = "20 pN"\n')
+    with pytest.raises(InputError, match="calibrated_up_to_force belongs to a chain of cylinders"):
+        beads('stretching_modulus = "1 pN"\ncalibrated_up_to_force = "20 pN"\n')
 
 
 def test_cylinders_have_no_beads():

@@ -7,7 +7,7 @@ from ...filaments.filament_type import FilamentType
 from ...filaments.presets import DSDNA, F_ACTIN, MICROTUBULE
 from ...mechanics.friction import EndCorrections
 from ...mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
-from ...theory import calibrated_to_force
+from ...theory import calibrated_up_to_force
 from ...units import quantities as units
 from ..keys import Choice, Inline, Key, Number, Quantity, Text, Whole, WordOrQuantity, as_written
 from ..table import TableKind
@@ -123,10 +123,10 @@ TYPE_KEYS = (
     ),
     Key("reduced_temperature", Number("0.034"), None, "See nu."),
     Key(
-        "calibrated_to_force",
+        "calibrated_up_to_force",
         Quantity(units.FORCE),
         None,
-        "Force at which the chain of segments has the extension of the wormlike chain: `theory.calibrated_to_force`. "
+        "Force up to which the chain of segments follows the wormlike chain: `theory.calibrated_up_to_force`. "
         "segment_length is then the length of filament that a segment stands for.",
     ),
     Key("coarse_graining", Whole(1, 10**6, "2"), 1, "How many beads of the type become one."),
@@ -158,14 +158,14 @@ def read_filament_type(entries, solvent):
     preset = PRESETS[entries["type"]] if "type" in entries else None
     with entries.naming():
         if isinstance(preset, BeadSpringType) or (preset is None and "bead_spacing" in entries):
-            entries.refuse(("calibrated_to_force",), "belongs to a chain of cylinders, but this one has beads.")
+            entries.refuse(("calibrated_up_to_force",), "belongs to a chain of cylinders, but this one has beads.")
             return _bead_spring_type(entries, solvent, preset)
         kind = _cylinder_type(entries, solvent, preset)
-        if "calibrated_to_force" not in entries:
+        if "calibrated_up_to_force" not in entries:
             return kind
         if solvent.temperature == 0.0:
-            raise entries.error("calibrated_to_force needs a temperature above zero.")
-        return calibrated_to_force(kind, entries["calibrated_to_force"], solvent.temperature)
+            raise entries.error("calibrated_up_to_force needs a temperature above zero.")
+        return calibrated_up_to_force(kind, entries["calibrated_up_to_force"], solvent.temperature)
 
 
 def _cylinder_type(entries, solvent, preset):
