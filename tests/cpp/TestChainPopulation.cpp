@@ -97,8 +97,7 @@ static void checkNucleation(double stepSize) {
 }
 
 static void testNucleation() {
-    for (double stepSize : {0.1, 1.0, 10.0})
-        checkNucleation(stepSize);
+    checkNucleation(10);
 }
 
 /** What begins in a closed pool takes its monomers, and the law of mass action holds. */
@@ -219,7 +218,7 @@ static void testContactsOfWhole() {
  * Chains that grow at v and are cut at r between any two monomers, with the part at the plus end lost: lengths are
  * (r L/v) exp(-r L^2/2v) where they are many monomers.
  */
-static void testSeveringLengths() {
+static void checkSeveringLengths(double stepSize) {
     const double speed = 40, rate = 0.004;
     const int number = 60, least = 4, most = 1200;
     // v p(n) is what comes back from all M > n to n or less, of which parts there are with four monomers or more.
@@ -236,39 +235,41 @@ static void testSeveringLengths() {
     }
     mean /= norm;
     checkClose(sqrt(M_PI*speed/(2*rate)), mean, 1, 4, "the law in the limit of many monomers");
-    for (double stepSize : {0.1, 5.0}) {
-        mt19937_64 generator = generatorOf(6);
-        Growing all;
-        all.system.tables = {makeTable(false)};
-        all.system.pools = {{1, 0}};
-        // New minus ends lose monomers until nothing is left.
-        GrowingEnd minus;
-        minus.states = {{0, 0, 0, 0, {}}, {0, 1e6, 1, 1, {}}};
-        for (int i = 0; i < 2*number; i++) {
-            all.add(WEIGHTS, i < number ? MonomerRange {0, 125} : MonomerRange {}, 100, minus, endOf(speed, 0),
-                    generator);
-            GrowingChain& own = all.system.chains[i];
-            own.severing = {rate, {}, 1, 0};
-            own.leastMonomers = least;
-            own.vanishes = i >= number;
-        }
-        ChainGrowth growth = all.makeGrowth();
-        Mean found;
-        for (int block = -2; block < 14; block++) {
-            Mean lengths;
-            for (double time = 0; time < 40; time += stepSize) {
-                all.advance(growth, stepSize, 3);
-                for (int i = 0; i < number; i++) {
-                    check(all.state.ranges[i].first == 0, "the minus end stays");
-                    lengths.add(all.state.ranges[i].size());
-                }
-            }
-            if (block >= 0)
-                found.add(lengths.mean());
-        }
-        check(all.state.population.waited == 0 && all.state.population.severed > 1000, "parts have a place");
-        checkMean(mean, found, 0.06, "lengths of chains that are cut");
+    mt19937_64 generator = generatorOf(6);
+    Growing all;
+    all.system.tables = {makeTable(false)};
+    all.system.pools = {{1, 0}};
+    // New minus ends lose monomers until nothing is left.
+    GrowingEnd minus;
+    minus.states = {{0, 0, 0, 0, {}}, {0, 1e6, 1, 1, {}}};
+    for (int i = 0; i < 2*number; i++) {
+        all.add(WEIGHTS, i < number ? MonomerRange {0, 125} : MonomerRange {}, 100, minus, endOf(speed, 0),
+                generator);
+        GrowingChain& own = all.system.chains[i];
+        own.severing = {rate, {}, 1, 0};
+        own.leastMonomers = least;
+        own.vanishes = i >= number;
     }
+    ChainGrowth growth = all.makeGrowth();
+    Mean found;
+    for (int block = -2; block < 14; block++) {
+        Mean lengths;
+        for (double time = 0; time < 40; time += stepSize) {
+            all.advance(growth, stepSize, 3);
+            for (int i = 0; i < number; i++) {
+                check(all.state.ranges[i].first == 0, "the minus end stays");
+                lengths.add(all.state.ranges[i].size());
+            }
+        }
+        if (block >= 0)
+            found.add(lengths.mean());
+    }
+    check(all.state.population.waited == 0 && all.state.population.severed > 1000, "parts have a place");
+    checkMean(mean, found, 0.06, "lengths of chains that are cut");
+}
+
+static void testSeveringLengths() {
+    checkSeveringLengths(5);
 }
 
 /** A chain that is cut: both parts have its equilibrium, and what is on it stays at its length along it. */
@@ -388,37 +389,39 @@ static void testSeveringHands() {
 }
 
 /** The cap of two units, each of which may be hydrolysed: the mean time to the first catastrophe (Brun et al. 2009). */
-static void testCapOfTwoUnits() {
+static void checkCapOfTwoUnits(double stepSize) {
     const double g = 3, h = 0.43;
     GrowingEnd plus;
     // Both GTP, the last one GTP alone, the one before it GTP alone, and none.
     plus.states = {{g, 0, 0, 0, {0, h, h, 0}}, {g, 0, 0, 0, {0, 0, 0, h}}, {g, 0, 1, 0, {0, 0, 0, h}},
             {0, 0, 3, 3, {0, 0, 0, 0}}};
     const double expected = 1/h+(g+h)*(g+h)/(h*h*(3*g+2*h));
-    for (double stepSize : {0.02, 1.0}) {
-        mt19937_64 generator = generatorOf(6);
-        Growing all;
-        all.system.tables = {makeTable(false)};
-        all.system.pools = {{1, 0}};
-        const int number = 1000;
+    mt19937_64 generator = generatorOf(6);
+    Growing all;
+    all.system.tables = {makeTable(false)};
+    all.system.pools = {{1, 0}};
+    const int number = 1000;
+    for (int i = 0; i < number; i++)
+        all.add(WEIGHTS, {0, 12}, 40, {}, plus, generator);
+    ChainGrowth growth = all.makeGrowth();
+    Mean times;
+    vector<char> has(number, 0);
+    for (double time = 0; time < 80; time += stepSize) {
+        all.advance(growth, stepSize, 3);
         for (int i = 0; i < number; i++)
-            all.add(WEIGHTS, {0, 12}, 40, {}, plus, generator);
-        ChainGrowth growth = all.makeGrowth();
-        Mean times;
-        vector<char> has(number, 0);
-        for (double time = 0; time < 80; time += stepSize) {
-            all.advance(growth, stepSize, 3);
-            for (int i = 0; i < number; i++)
-                if (!has[i] && all.state.endStates[2*i+1] == 3) {
-                    has[i] = 1;
-                    times.add(time+0.5*stepSize);
-                    check(all.state.events[2*i+1].switches[3] == 1, "one catastrophe");
-                }
-        }
-        check(times.count > 0.999*number, "all have a catastrophe");
-        checkClose(expected, times.mean(), 4*times.error(), 1, "the time to a catastrophe");
-        check(times.error() < 0.04*expected, "too few chains");
+            if (!has[i] && all.state.endStates[2*i+1] == 3) {
+                has[i] = 1;
+                times.add(time+0.5*stepSize);
+                check(all.state.events[2*i+1].switches[3] == 1, "one catastrophe");
+            }
     }
+    check(times.count > 0.999*number, "all have a catastrophe");
+    checkClose(expected, times.mean(), 4*times.error(), 1, "the time to a catastrophe");
+    check(times.error() < 0.04*expected, "too few chains");
+}
+
+static void testCapOfTwoUnits() {
+    checkCapOfTwoUnits(1);
 }
 
 /**
@@ -522,7 +525,14 @@ static void testStatesOfMonomers() {
     }
 }
 
+static void testShortSteps() {
+    checkNucleation(0.1);
+    checkNucleation(1);
+    checkSeveringLengths(0.1);
+    checkCapOfTwoUnits(0.02);
+}
+
 int main() {
     return runTests({testNucleation, testPool, testNucleationAtWall, testContactsOfWhole, testSeveringLengths,
-            testSevering, testSeveringHands, testCapOfTwoUnits, testStatesOfMonomers});
+            testSevering, testSeveringHands, testCapOfTwoUnits, testStatesOfMonomers}, {testShortSteps});
 }

@@ -285,8 +285,13 @@ inline Array acrossBox(const Array& x) {
     return wrapped;
 }
 
-/** Run all tests, and return the exit code of the program. */
-inline int runTests(const vector<void (*)()>& tests) {
+/**
+ * Run all tests, and return the exit code of the program. Repeats are long, and run code that others run as well: they
+ * are left out where CYLCHAIN_WITHOUT_REPEATS is set, as with sanitizers.
+ */
+inline int runTests(vector<void (*)()> tests, const vector<void (*)()>& repeats = {}) {
+    if (getenv("CYLCHAIN_WITHOUT_REPEATS") == NULL)
+        tests.insert(tests.end(), repeats.begin(), repeats.end());
     try {
         for (auto test : tests)
             test();

@@ -51,26 +51,46 @@ static void checkDiffusing(const Rods& rods, LinkerSystem system, double stepSiz
     checkEquilibrium(kinetics, state, step, expectedOn(rods, system, volume));
 }
 
-/** In periodic boxes and within walls, with steps over a factor of a hundred. */
-static void testEquilibrium() {
-    Rods crossed, parallel;
-    const double a[] = {-50, 0, 0}, b[] = {0, -30, 20}, c[] = {-45, 0, 20}, y[] = {0.6, 0.8, 0};
-    crossed.add(a, ALONG_X, 2, 50);
+static const double SKEWED_BOX[] = {400, 0, 0, 100, 400, 0, -150, 50, 400};
+
+static const double LEFT[] = {-50, 0, 0};
+
+static void checkCrossedRods(double stepSize) {
+    Rods crossed;
+    const double b[] = {0, -30, 20}, y[] = {0.6, 0.8, 0};
+    crossed.add(LEFT, ALONG_X, 2, 50);
     crossed.add(b, y, 1, 100);
-    parallel.add(a, ALONG_X, 1, 100);
+    checkDiffusing(crossed, diffusing(twoHands(0.02, 0, 120, 120, 0), 2e4), stepSize, SKEWED_BOX, 6.4e7);
+}
+
+static Rods parallelRods() {
+    Rods parallel;
+    const double c[] = {-45, 0, 20};
+    parallel.add(LEFT, ALONG_X, 1, 100);
     parallel.add(c, ALONG_X, 4, 25);
-    const double box[] = {400, 0, 0, 100, 400, 0, -150, 50, 400};
-    for (double stepSize : {0.1, 10.0})
-        checkDiffusing(crossed, diffusing(twoHands(0.02, 0, 120, 120, 0), 2e4), stepSize, box, 6.4e7);
-    // Hands that differ, in a box so small that it has two cells along an axis.
-    checkDiffusing(parallel, diffusing(twoHands(0.05, 30, 80, 110, 0.6), 5e3), 0.2, box, 6.4e7);
-    // The rods touch a sphere, so that linkers cannot be all around them, and the faces of a box.
-    const double center[] = {0, -230, 0}, zero[] = {0, 0, 1}, lower[] = {-60, -10, -60}, upper[] = {180, 190, 140};
-    const Wall sphere = wallOf(WallShape::Sphere, center, zero, 250);
-    checkDiffusing(parallel, diffusing(twoHands(0.02, 0, 100, 100, 0), 1e4, {sphere}), 0.3, NULL,
-            4*M_PI/3*pow(250, 3));
+    return parallel;
+}
+
+/** In a periodic box and within walls. */
+static void testEquilibrium() {
+    checkCrossedRods(10);
+    // The rods touch the faces of a box, so that linkers cannot be all around them.
+    const double lower[] = {-60, -10, -60}, upper[] = {180, 190, 140};
     const Wall faces = wallOf(WallShape::Box, lower, upper, 0);
-    checkDiffusing(parallel, diffusing(twoHands(0.02, 0, 100, 100, 0), 1e4, {faces}, 0.02), 0.3, NULL, 9.6e6);
+    checkDiffusing(parallelRods(), diffusing(twoHands(0.02, 0, 100, 100, 0), 1e4, {faces}, 0.02), 0.3, NULL, 9.6e6);
+}
+
+static void testEquilibriumInSphere() {
+    const double center[] = {0, -230, 0}, zero[] = {0, 0, 1};
+    const Wall sphere = wallOf(WallShape::Sphere, center, zero, 250);
+    checkDiffusing(parallelRods(), diffusing(twoHands(0.02, 0, 100, 100, 0), 1e4, {sphere}), 0.3, NULL,
+            4*M_PI/3*pow(250, 3));
+}
+
+/** Steps a hundred times as short, and hands that differ, in a box so small that it has two cells along an axis. */
+static void testEquilibriumInShortSteps() {
+    checkCrossedRods(0.1);
+    checkDiffusing(parallelRods(), diffusing(twoHands(0.05, 30, 80, 110, 0.6), 5e3), 0.2, SKEWED_BOX, 6.4e7);
 }
 
 /** In the plane, the volume of hands has an area in its place. */
@@ -118,56 +138,62 @@ static void testRandomWalks() {
 }
 
 /** All of a sphere is as likely, with bound linkers at its wall and in its middle. */
-static void testUniformDensity() {
+static void checkUniformDensity(double size) {
     Rods rods;
     const double a[] = {-50, 85, 0};
     rods.add(a, ALONG_X, 2, 50);
     const double center[] = {0, 0, 0}, zero[] = {0, 0, 1}, radius = 100;
-    for (double size : {0.1, 2.0}) {
-        LinkerSystem system = diffusing(twoHands(0.05, 0, 30, 30, 0), 2e3,
-                {wallOf(WallShape::Sphere, center, zero, radius)});
-        const KineticStep step = stepOf(rods.x, size);
-        bindToAll(rods, system);
-        LinkerKinetics kinetics(system, rods.chains);
-        LinkerState state = placed(freeLinkers(4000), system, step);
-        for (int i = 0; i < 100/size; i++)
-            kinetics.advance(state, step, SERIAL);
-        vector<Mean> means(4);
-        for (int block = 0; block < 20; block++) {
-            for (int sample = 0; sample < 5; sample++) {
-                for (int i = 0; i < 10/size; i++)
-                    kinetics.advance(state, step, SERIAL);
-                for (size_t i = 0; i < state.linkers.size(); i++) {
-                    const double* x = &state.positions[3*i];
-                    const Linker& linker = state.linkers[i];
-                    check(std::isnan(x[0]) == (linker.isHeld(0) || linker.isHeld(1)), "who has a position");
-                    if (std::isnan(x[0]))
-                        continue;
-                    const double r = sqrt(x[0]*x[0]+x[1]*x[1]+x[2]*x[2]);
-                    check(r <= radius, "outside");
-                    // Half of them in the inner shell, and where the rod is.
-                    means[0].add(r < radius*cbrt(0.5));
-                    means[1].add(x[1] > 50);
-                    means[2].add(r*r);
-                    means[3].add(x[0]*x[0] < 2500 && x[1] > 60);
-                }
+    LinkerSystem system = diffusing(twoHands(0.05, 0, 30, 30, 0), 2e3,
+            {wallOf(WallShape::Sphere, center, zero, radius)});
+    const KineticStep step = stepOf(rods.x, size);
+    bindToAll(rods, system);
+    LinkerKinetics kinetics(system, rods.chains);
+    LinkerState state = placed(freeLinkers(4000), system, step);
+    for (int i = 0; i < 100/size; i++)
+        kinetics.advance(state, step, SERIAL);
+    vector<Mean> means(4);
+    for (int block = 0; block < 20; block++) {
+        for (int sample = 0; sample < 5; sample++) {
+            for (int i = 0; i < 10/size; i++)
+                kinetics.advance(state, step, SERIAL);
+            for (size_t i = 0; i < state.linkers.size(); i++) {
+                const double* x = &state.positions[3*i];
+                const Linker& linker = state.linkers[i];
+                check(std::isnan(x[0]) == (linker.isHeld(0) || linker.isHeld(1)), "who has a position");
+                if (std::isnan(x[0]))
+                    continue;
+                const double r = sqrt(x[0]*x[0]+x[1]*x[1]+x[2]*x[2]);
+                check(r <= radius, "outside");
+                // Half of them in the inner shell, and where the rod is.
+                means[0].add(r < radius*cbrt(0.5));
+                means[1].add(x[1] > 50);
+                means[2].add(r*r);
+                means[3].add(x[0]*x[0] < 2500 && x[1] > 60);
             }
-            for (Mean& mean : means)
-                mean.endBlock();
         }
-        means[0].check("inner half", 0.5);
-        means[1].check("cap", 5.0/32);
-        means[2].check("radius of gyration", 0.6*radius*radius);
-        // A cap less its parts with |x| > 50, by sums.
-        double part = 0;
-        const int points = 400;
-        for (int i = 0; i < points; i++)
-            for (int k = 0; k < points; k++) {
-                const double x = -50+(i+0.5)*100/points, y = 60+(k+0.5)*40/points;
-                part += 2*sqrt(max(0.0, radius*radius-x*x-y*y))*(100.0/points)*(40.0/points);
-            }
-        means[3].check("at the rod", part/(4*M_PI/3*pow(radius, 3)));
+        for (Mean& mean : means)
+            mean.endBlock();
     }
+    means[0].check("inner half", 0.5);
+    means[1].check("cap", 5.0/32);
+    means[2].check("radius of gyration", 0.6*radius*radius);
+    // A cap less its parts with |x| > 50, by sums.
+    double part = 0;
+    const int points = 400;
+    for (int i = 0; i < points; i++)
+        for (int k = 0; k < points; k++) {
+            const double x = -50+(i+0.5)*100/points, y = 60+(k+0.5)*40/points;
+            part += 2*sqrt(max(0.0, radius*radius-x*x-y*y))*(100.0/points)*(40.0/points);
+        }
+    means[3].check("at the rod", part/(4*M_PI/3*pow(radius, 3)));
+}
+
+static void testUniformDensity() {
+    checkUniformDensity(2);
+}
+
+static void testUniformDensityInShortSteps() {
+    checkUniformDensity(0.1);
 }
 
 /** What is left of linkers in a cylinder around a rod that they bind to for ever, by sums over rings and times. */
@@ -230,7 +256,11 @@ int main() {
         testRandomWalks,
         testEquilibrium,
         testEquilibriumInPlane,
-        testUniformDensity,
+        testUniformDensity
+    }, {
+        testEquilibriumInSphere,
+        testEquilibriumInShortSteps,
+        testUniformDensityInShortSteps,
         testDepletion
     });
 }

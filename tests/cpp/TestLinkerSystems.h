@@ -112,17 +112,19 @@ inline Expected expectedOn(const Rods& rods, const LinkerSystem& system, double 
     const Contours contours(rods.chains);
     const double inVolume = 4*M_PI/3*pow(a.reach*b.reach, 1.5)/volume;
     const double ofA = a.bindingRate/a.unbindingRate, ofB = b.bindingRate/b.unbindingRate;
+    const int points = 1500;
+    Array places[] = {Array(3*points), Array(3*points)};
+    for (int i = 0; i < 2; i++)
+        for (int p = 0; p < points; p++)
+            locate(contours.findPlace(i, contours.getLength(i)*(p+0.5)/points), rods.x.data(), NULL, &places[i][3*p]);
     double one = 0, both = 0, square = 0;
     for (int i = 0; i < 2; i++) {
         one += inVolume*contours.getLength(i)*(ofA+ofB);
         const double length = contours.getLength(i), other = contours.getLength(1-i);
-        const int points = 1500;
         for (int p = 0; p < points; p++)
             for (int q = 0; q < points; q++) {
-                double u[3], v[3], d = 0;
-                const double s = length*(p+0.5)/points, t = other*(q+0.5)/points;
-                locate(contours.findPlace(i, s), rods.x.data(), NULL, u);
-                locate(contours.findPlace(1-i, t), rods.x.data(), NULL, v);
+                const double *u = &places[i][3*p], *v = &places[1-i][3*q], s = length*(p+0.5)/points;
+                double d = 0;
                 for (int k = 0; k < 3; k++)
                     d += (u[k]-v[k])*(u[k]-v[k]);
                 d = sqrt(d);

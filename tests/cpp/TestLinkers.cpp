@@ -382,21 +382,25 @@ static void testCompetitionForSites() {
     }
 }
 
-/** Neither threads nor the box in which positions are given matter. */
-static void testThreadsAndImages() {
+static Rods besideEachOther() {
     Rods rods;
     const double a[] = {-100, 0, 0}, b[] = {-90, 0, 20};
     rods.add(a, ALONG_X, 4, 50);
     rods.add(b, ALONG_X, 5, 40);
-    LinkerSystem system;
-    system.kT = KT;
-    system.hands = {handOf(0.3, 60, 1, {0, 1}), handOf(0.6, 60, 0.5, {0, 1})};
+    return rods;
+}
+
+/** One of the two hands walks. */
+static LinkerSystem walkersOnBoth() {
+    LinkerSystem system = twoHands(0.05, 0, 60, 60, 0);
     system.hands[1].speed = 0.5;
-    LinkerType type;
-    type.hands[0] = 0;
-    type.hands[1] = 1;
-    type.stiffness = 0.05;
-    system.types = {type};
+    return system;
+}
+
+/** Neither threads nor the box in which positions are given matter. */
+static void testThreadsAndImages() {
+    const Rods rods = besideEachOther();
+    const LinkerSystem system = walkersOnBoth();
     const double box[] = {500, 0, 0, 70, 500, 0, -60, 40, 500};
     Array wrapped = rods.x;
     for (size_t node = 5; node < rods.x.size()/3; node++)
@@ -434,19 +438,8 @@ static void testThreadsAndImages() {
 
 /** What a linker does depends neither on which others there are nor on where it is stored. */
 static void testOrderOfStorage() {
-    Rods rods;
-    const double a[] = {-100, 0, 0}, b[] = {-90, 0, 20};
-    rods.add(a, ALONG_X, 4, 50);
-    rods.add(b, ALONG_X, 5, 40);
-    LinkerSystem system;
-    system.kT = KT;
-    system.hands = {handOf(0.3, 60, 1, {0, 1}), handOf(0.6, 60, 0.5, {0, 1})};
-    system.hands[1].speed = 0.5;
-    LinkerType type;
-    type.hands[0] = 0;
-    type.hands[1] = 1;
-    type.stiffness = 0.05;
-    system.types = {type};
+    const Rods rods = besideEachOther();
+    const LinkerSystem system = walkersOnBoth();
     LinkerState all = freeLinkers(900), some, reversed = all;
     for (size_t i = 0; i < all.linkers.size(); i += 3)
         some.linkers.push_back(all.linkers[i]);

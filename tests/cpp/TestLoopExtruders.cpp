@@ -42,38 +42,42 @@ static double loopOf(const Linker& linker) {
  * Sparse extruders: loops are d+(v1+v2)/k long, with the rate k = k1+k2. Those that bind in a step walk for all of it:
  * they have taken n steps with the probability (1-x) x^(n-1), where x = exp(-k h). Hands on sites step at random times.
  */
-static void testLoops() {
+static void checkLoops(double stepSize) {
     const Rods rods = rodOf(1e6);
     for (double spacing : {0.0, 10.0})
-        for (double second : {40.0, 0.0})
-            for (double stepSize : {0.02, 0.2, 2.0}) {
-                const LinkerSystem system = extruders(20, second, 0.3, 0.2, spacing);
-                KineticStep step = stepOf(rods.x, stepSize);
-                step.volume = 4*M_PI/3*pow(20, 3)*1e6;
-                LinkerKinetics kinetics(system, rods.chains);
-                LinkerState state = freeLinkers(spacing > 0 ? 50 : 500);
-                // The sites of many would not be free.
-                const int interval = max(1, (int) (2/stepSize)), blocks = 20, samples = spacing > 0 ? 100 : 10;
-                for (int i = 0; i < 10*interval; i++)
-                    kinetics.advance(state, step, SERIAL);
-                Mean loop, bound;
-                for (int block = 0; block < blocks; block++) {
-                    for (int sample = 0; sample < samples; sample++) {
-                        for (int i = 0; i < interval; i++)
-                            kinetics.advance(state, step, SERIAL);
-                        for (const Linker& linker : state.linkers) {
-                            bound.add(linker.pulls());
-                            if (linker.pulls())
-                                loop.add(loopOf(linker));
-                        }
+        for (double second : {40.0, 0.0}) {
+            const LinkerSystem system = extruders(20, second, 0.3, 0.2, spacing);
+            KineticStep step = stepOf(rods.x, stepSize);
+            step.volume = 4*M_PI/3*pow(20, 3)*1e6;
+            LinkerKinetics kinetics(system, rods.chains);
+            LinkerState state = freeLinkers(spacing > 0 ? 50 : 500);
+            // The sites of many would not be free.
+            const int interval = max(1, (int) (2/stepSize)), blocks = 20, samples = spacing > 0 ? 100 : 10;
+            for (int i = 0; i < 10*interval; i++)
+                kinetics.advance(state, step, SERIAL);
+            Mean loop, bound;
+            for (int block = 0; block < blocks; block++) {
+                for (int sample = 0; sample < samples; sample++) {
+                    for (int i = 0; i < interval; i++)
+                        kinetics.advance(state, step, SERIAL);
+                    for (const Linker& linker : state.linkers) {
+                        bound.add(linker.pulls());
+                        if (linker.pulls())
+                            loop.add(loopOf(linker));
                     }
-                    loop.endBlock();
-                    bound.endBlock();
                 }
-                const double rate = 0.5, time = spacing > 0 ? 1/rate : stepSize/-expm1(-rate*stepSize);
-                loop.check("loop", 10+(20+second)*time);
-                bound.check("bound", 1/(1+rate));
+                loop.endBlock();
+                bound.endBlock();
             }
+            const double rate = 0.5, time = spacing > 0 ? 1/rate : stepSize/-expm1(-rate*stepSize);
+            loop.check("loop", 10+(20+second)*time);
+            bound.check("bound", 1/(1+rate));
+        }
+}
+
+static void testLoops() {
+    checkLoops(0.2);
+    checkLoops(2);
 }
 
 /** Extruders on a lattice with the same rates, one event after the other: the mean loop, and how many are bound. */
@@ -171,49 +175,57 @@ static void testDense() {
 }
 
 /** Hands that walk past a barrier are captured with a probability, and released with a rate; others pass it. */
-static void testBarriers() {
+static void checkBarriers(double stepSize) {
     const Rods rods = rodOf(1e5);
     const double where = 50040, from = 50000, release = 0.2, speed = 20, time = 6;
     for (double spacing : {0.0, 10.0})
-        for (double probability : {1.0, 0.6})
-            for (double stepSize : {0.06, 0.6}) {
-                LinkerSystem system = extruders(speed, speed, 0, 0, spacing);
-                // The second one is in the way of hands that walk to the minus end.
-                system.barriers = {{0, where, 1, probability, release}, {0, from-1000, 1, 1, 0}};
-                KineticStep step = stepOf(rods.x, stepSize);
-                Mean held;
-                for (int block = 0; block < 20; block++) {
-                    step.seed = 100+block;
-                    // One linker each, or they would take the sites of others.
-                    const int trials = spacing > 0 ? 1 : 2000;
-                    for (int trial = 0; trial < (spacing > 0 ? 1200 : 1); trial++) {
-                        step.force = trial;
-                        LinkerKinetics kinetics(system, rods.chains);
-                        LinkerState state = freeLinkers(trials);
-                        for (Linker& linker : state.linkers)
-                            for (int side = 0; side < 2; side++)
-                                linker.hands[side] = {0, spacing > 0 ? from-15+20*side : from-10+10*side};
-                        const int steps = (int) (time/stepSize+0.5);
-                        for (int i = 0; i < steps; i++)
-                            kinetics.advance(state, step, SERIAL);
-                        for (const Linker& linker : state.linkers) {
-                            const double along = linker.hands[1].position;
-                            held.add(spacing > 0 ? floor(along/10) == where/10 : along == where);
-                            check(spacing > 0 || linker.hands[0].position < from-120, "what walks on is captured");
-                        }
+        for (double probability : {1.0, 0.6}) {
+            LinkerSystem system = extruders(speed, speed, 0, 0, spacing);
+            // The second one is in the way of hands that walk to the minus end.
+            system.barriers = {{0, where, 1, probability, release}, {0, from-1000, 1, 1, 0}};
+            KineticStep step = stepOf(rods.x, stepSize);
+            Mean held;
+            for (int block = 0; block < 20; block++) {
+                step.seed = 100+block;
+                // One linker each, or they would take the sites of others.
+                const int trials = spacing > 0 ? 1 : 2000;
+                for (int trial = 0; trial < (spacing > 0 ? 1200 : 1); trial++) {
+                    step.force = trial;
+                    LinkerKinetics kinetics(system, rods.chains);
+                    LinkerState state = freeLinkers(trials);
+                    for (Linker& linker : state.linkers)
+                        for (int side = 0; side < 2; side++)
+                            linker.hands[side] = {0, spacing > 0 ? from-15+20*side : from-10+10*side};
+                    const int steps = (int) (time/stepSize+0.5);
+                    for (int i = 0; i < steps; i++)
+                        kinetics.advance(state, step, SERIAL);
+                    for (const Linker& linker : state.linkers) {
+                        const double along = linker.hands[1].position;
+                        held.add(spacing > 0 ? floor(along/10) == where/10 : along == where);
+                        check(spacing > 0 || linker.hands[0].position < from-120, "what walks on is captured");
                     }
-                    held.endBlock();
                 }
-                // They come to it in a step, or after four steps of a hand, each of which takes 1/(v/a) on average.
-                const double rate = speed/10, arrival = ceil((where-from)/speed/stepSize-1e-9)*stepSize;
-                double expected = probability*exp(-release*(time-arrival));
-                if (spacing > 0) {
-                    // Released hands step on with the rate v/a; so do hands that are not captured.
-                    const double stays = exp(-release*time)*pow(1-release/rate, -4);
-                    expected = probability*stays*(1+release/(rate-release));
-                }
-                held.check("held by a barrier", expected);
+                held.endBlock();
             }
+            // They come to it in a step, or after four steps of a hand, each of which takes 1/(v/a) on average.
+            const double rate = speed/10, arrival = ceil((where-from)/speed/stepSize-1e-9)*stepSize;
+            double expected = probability*exp(-release*(time-arrival));
+            if (spacing > 0) {
+                // Released hands step on with the rate v/a; so do hands that are not captured.
+                const double stays = exp(-release*time)*pow(1-release/rate, -4);
+                expected = probability*stays*(1+release/(rate-release));
+            }
+            held.check("held by a barrier", expected);
+        }
+}
+
+static void testBarriers() {
+    checkBarriers(0.6);
+}
+
+static void testShortSteps() {
+    checkLoops(0.02);
+    checkBarriers(0.06);
 }
 
 /** A ring has no ends: hands come around to a barrier, and a pair loads across the place where it is closed. */
@@ -264,5 +276,7 @@ int main() {
         testDense,
         testBarriers,
         testRing
+    }, {
+        testShortSteps
     });
 }
