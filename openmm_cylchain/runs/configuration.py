@@ -205,7 +205,7 @@ def configuration_of(entries, text, folder, lines):
         else:
             found = _configuration(entries, text, Path(folder), lines)
         for own in found.tables["filament"]:
-            own.refuse(("delete",), "belongs to a [[stage]] behind the first one: write [stage.filament] there.")
+            own.refuse(("delete", "cut"), "belongs to a [[stage]] behind the first one: write [stage.filament] there.")
         return found
     except UnknownKeyError as error:
         raise error.with_suggestion(_OWNERS).with_line(lines) from None
