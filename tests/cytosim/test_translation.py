@@ -724,6 +724,7 @@ def test_convex_polygons_have_planes(tmp_path, points, dimensions):
     assert 300 < within.sum() < 2700
     corners = {"order = 5": 5, "points = 0 0, 0": 4, "points = 0 0, 4": 3}
     assert len(found.walls) == next(own for name, own in corners.items() if points.startswith(name)) + dimensions - 2
+    assert len(document.tables_called("[[wall]]")) == 1
 
 
 @pytest.mark.parametrize("points", ["points = 0 0, 3 0, 3 1, 1 1, 1 3, 0 3", "points = 0 3, 2 -2, -3 1, 3 1, -2 -2"])
