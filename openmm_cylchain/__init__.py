@@ -18,7 +18,7 @@ from .couplings.force_reporters import ContactForceReporter, WallForceReporter
 from .couplings.joints import Joints
 from .couplings.mean_forces import ContactForces, WallForces, contact_forces, wall_forces
 from .couplings.pulling import ConstantVelocityPulling, change_constant_force, constant_force, constant_tension
-from .couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Slab, Sphere, Torus
+from .couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Slab, Sphere, Torus, prism_faces
 from .couplings.wall_points import random_points_on
 from .couplings.walls import filament_wall_force, wall_force
 from .engine_choice import prepare_openmm
@@ -181,6 +181,7 @@ __all__ = [
     "filament_wall_force",
     "make_trajectory_whole",
     "make_whole",
+    "prism_faces",
     "random_points_on",
     "recommended_time_step",
     "remove_jumps",

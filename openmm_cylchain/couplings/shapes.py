@@ -8,14 +8,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from ..errors import InputError
 from ..mechanics.geometry import directions_across
-from ..units.quantities import LENGTH, in_units_of, positive, unit_vector, vector
+from ..units.quantities import LENGTH, finite_number, in_units_of, positive, unit_vector, vector
 from ..units.types import FloatArray, FloatOrArray, Scalar, Vector, Vectors
 
 # In nm^2: keeps the derivative of a square root finite at its zero, in single precision as well.
 _TINY = "1e-30"
+# Angle by which sides of a polygon turn that are in a line.
+_IN_LINE = 1e-9
 
 
 Region = tuple[str, FloatArray, FloatArray, float]
@@ -496,6 +499,64 @@ class Ellipsoid(Face):
         of_square, of_steepness = 2.0 * relative / squares, 2.0 * relative / squares**2
         rise = (1.0 - 0.5 / np.maximum(s, 0.5)) / np.sqrt(steepness)
         return depths, rise[..., None] * of_square - (0.5 * depths / steepness)[..., None] * of_steepness
+
+
+def prism_faces(
+    corners: npt.ArrayLike, bottom: Scalar | None = None, top: Scalar | None = None
+) -> tuple[Plane | Slab, ...]:
+    """What encloses a prism over a convex polygon, along z: a Plane for each side, and a Slab if it has ends.
+
+    Each is a wall by itself. Beyond an edge, what two of them hold is pushed by both, each by its own depth, so that
+    the energy is ``(k/2) sum d_i^2``, as that of a ``Box``.
+
+    Parameters
+    ----------
+    corners : (n, 2) length
+        x and y, one after the other, either way round. Sides that go on in a line are one.
+    bottom, top : length, optional
+        z of its ends; it goes on without end if not given.
+
+    Returns
+    -------
+    tuple of Plane and Slab
+
+    Raises
+    ------
+    InputError
+        If there are less than three corners, two of them are in one place, the polygon is not convex or crosses itself,
+        or the top is not above the bottom.
+
+    Examples
+    --------
+    >>> for face in prism_faces([[0, 0], [2000, 0], [0, 2000]]):  # doctest: +SKIP
+    ...     system.addForce(filament_wall_force(filaments, system, face, 1000.0))
+    """
+    points = np.asarray(in_units_of(corners, LENGTH, "corners"), dtype=float)
+    if points.ndim != 2 or points.shape[1:] != (2,) or len(points) < 3:
+        raise InputError(f"corners must have the shape (n, 2) with at least three, but have {points.shape}.")
+    ways = np.roll(points, -1, axis=0) - points
+    lengths = np.linalg.norm(ways, axis=1)
+    if not np.all(lengths > 0.0):
+        raise InputError(f"Corner {int(np.argmin(lengths))} and the next one are in one place: leave one of them out.")
+    ways = ways / lengths[:, None]
+    before = np.roll(ways, 1, axis=0)
+    turns = np.arctan2(before[:, 0] * ways[:, 1] - before[:, 1] * ways[:, 0], np.sum(before * ways, axis=1))
+    sense = math.copysign(1.0, float(turns.sum()))
+    if np.any(sense * turns < -_IN_LINE) or not math.isclose(sense * float(turns.sum()), 2.0 * math.pi, rel_tol=1e-6):
+        raise InputError("corners must be those of a convex polygon, one after the other.")
+    faces: list[Plane | Slab] = [
+        Plane([*point, 0.0], [-sense * way[1], sense * way[0], 0.0])
+        for point, way, turn in zip(points, ways, turns)
+        if sense * turn > _IN_LINE
+    ]
+    if bottom is not None or top is not None:
+        if bottom is None or top is None:
+            raise InputError("A prism has both a bottom and a top, or none of them.")
+        low, high = (finite_number(own, LENGTH, name) for own, name in ((bottom, "bottom"), (top, "top")))
+        if not low < high:
+            raise InputError(f"top must be above bottom, but they are at {high:g} and {low:g} nm.")
+        faces.append(Slab([0.0, 0.0, 0.5 * (low + high)], [0.0, 0.0, 1.0], high - low))
+    return tuple(faces)
 
 
 ClosedShape = Box | Sphere | Ellipsoid | Capsule | Torus

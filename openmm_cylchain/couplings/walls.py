@@ -146,8 +146,9 @@ def filament_wall_force(
     force.setName(
         f"CylinderChainWallForce ({name})" if side == "inside" else f"CylinderChainWallForce ({name}, {side})"
     )
+    every, beads = filaments.node_indices, filaments.bead_indices
     for index, value in zip(held, radii):
-        own = filaments.node_indices[index], filaments.bead_indices[index]
+        own = every[index], beads[index]
         places = np.array(filaments[index].type.segment_kind.particles_along(*own))
         if nodes != "all" and (filaments[index].closed or filaments[index].growth is not None):
             what = "is a ring, without ends" if filaments[index].closed else "grows"

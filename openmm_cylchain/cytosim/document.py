@@ -102,7 +102,7 @@ def number_in(text):
 
 
 def point(vector):
-    """Three lengths in um."""
+    """Lengths in um."""
     return [quantity(round(float(value), 9) + 0.0, "um") for value in vector]
 
 

@@ -101,7 +101,7 @@ def _usual_monomer(settings):
 
 
 def find_cutting(script, fiber):
-    """The hand that cuts fibers of a Property of a Script, as a Property; None if none does."""
+    """The Settings of the hand, or of the plane, that cuts fibers of a Property of a Script; None if nothing does."""
     own = binding_key(fiber.settings.number("binding_key"))
     for kind in ("single", "couple"):
         for new in (new for new in script.created if new.kind == kind):
@@ -112,8 +112,8 @@ def find_cutting(script, fiber):
                 if hand.settings.number("cutting_rate", default=0.0) > 0.0 and own & binding_key(
                     hand.settings.number("binding_key", ("binding", 2))
                 ):
-                    return hand
-    return None
+                    return hand.settings
+    return script.cut_fibers.get(fiber.name)
 
 
 def binding_key(number):
@@ -139,10 +139,12 @@ def still_growth(fiber):
 
 
 def _add_cutting(translation, growing, cutting):
-    growing.entries.append(("severing_rate", "0 1/(um*s)", Note(EXACT, "hands alone cut it")))
-    settings = cutting.settings
-    plus, minus = (_STATES.get(settings.text(("new_end_state", own), default="white"), _STILL) for own in (0, 1))
-    line, keys = settings.line_of("new_end_state"), [key for key, *_ in growing.entries]
+    is_plane = cutting.label == "cut"
+    text = "planes alone cut it" if is_plane else "hands alone cut it"
+    growing.entries.append(("severing_rate", "0 1/(um*s)", Note(EXACT, text)))
+    usual = "red" if is_plane else "white", "white"
+    plus, minus = (_STATES.get(cutting.text(("new_end_state", own), default=usual[own]), _STILL) for own in (0, 1))
+    line, keys = cutting.line_of("new_end_state"), [key for key, *_ in growing.entries]
     turns = "catastrophe_rate" in keys or "hydrolysis_rate" in keys
     if turns and plus == _SHRINKING:
         growing.entries.append(("severed_ends_shrink", True, Note(EXACT, "new_end_state", line)))

@@ -1,7 +1,8 @@
 """What a configuration of Cytosim does: its commands, followed one after the other up to each of its runs.
 
-Runs between which values change, linkers and fibers come and go are stages of one run of ours. Runs between which
-fibers are cut, go by where they are, or come and grow are of different parts, of which the longest is taken.
+Runs between which values change, linkers and fibers come and go, and fibers are cut by planes are stages of one run of
+ours. Runs between which fibers go by where they are, or come and grow are of different parts, of which the longest is
+taken.
 """
 
 import math
@@ -20,9 +21,9 @@ KINDS = (*KINDS, "nucleus", "fake", "organizer")
 """Classes of objects, apart from simul."""
 
 _WITHOUT_EFFECT = ("report", "write", "export", "save", "mark", "call", "dump", "print")
-_STATES = ("cut", "move", "import", "load", "equilibrate")
+_STATES = ("move", "import", "load", "equilibrate")
 _SOLVE = "solve"
-FILAMENTS_CHANGE = "stages: filaments that go, are cut, or come and grow"
+FILAMENTS_CHANGE = "stages: filaments that go by where they are, or come and grow"
 _MOST_COMMANDS, _MOST_FILES = 200_000, 10
 _BRACKETED = re.compile(r"\[([^\[\]]*)\]")
 _RANGE = re.compile(r"([A-Za-z_]\w*)=(-?\d+):(-?\d+)(?::(-?\d+))?")
@@ -40,13 +41,17 @@ class Property:
 
 @dataclass
 class New:
-    """Objects that are created: how many, of which class and property, and with which settings."""
+    """Objects that are created: how many, of which class and property, and with which settings.
+
+    They are ``late`` if they come between runs of one part; None before a run.
+    """
 
     count: int
     kind: str
     name: str
     settings: Settings
     line: int
+    late: bool | None = None
 
 
 @dataclass
@@ -57,7 +62,9 @@ class Script:
     needs) of what is left out of others, ``choices`` (line, sentence) of what was chosen in a template. ``broken`` is
     (line, sentence) of what has happened to filaments since the run before, and ``unbound`` which of the hands that are
     not bound have taken their linkers away since then, by names. Fibers that are deleted stay in ``created``:
-    ``deleted`` are (number, count), which of those that have created fibers, and how many go, None for all.
+    ``deleted`` are (number, count), which of those that have created fibers, and how many go, None for all. ``cuts``
+    are (numbers, settings) of planes by which fibers are cut, and ``cut_fibers`` those settings by the names of fibers
+    that are cut in any of the runs.
     """
 
     simul: Settings = field(default_factory=lambda: Settings("simul", 1))
@@ -71,6 +78,8 @@ class Script:
     broken: list = field(default_factory=list)
     unbound: dict = field(default_factory=dict)
     deleted: list = field(default_factory=list)
+    cuts: list = field(default_factory=list)
+    cut_fibers: dict = field(default_factory=dict)
     frames: int = 0
 
     @property
@@ -151,16 +160,25 @@ class _Follower:
         if not parts:
             return self._replayed(len(self._actions))
         chosen = max(parts, key=lambda part: sum(run["steps"] for run in part))
-        scripts, notes, unbound, deleted = [], 0, {}, 0
+        scripts, notes, unbound, deleted, cuts = [], 0, {}, 0, 0
         for run in chosen:
             own = self._replayed(run["number"])
             own.run, own.steps, own.frames = run["settings"], run["steps"], run["frames"]
             between, notes = own.stages[notes:], len(own.stages)
             own.stages = between if scripts else []
             own.deleted, deleted = own.deleted[deleted:], len(own.deleted)
+            own.cuts, cuts = own.cuts[cuts:], len(own.cuts)
             own.unbound, unbound = {k: v for k, v in own.unbound.items() if v != unbound.get(k)}, own.unbound
             scripts.append(own)
         first, *first.later = scripts
+        cut_fibers = {}
+        for own in scripts[1:]:
+            cut_fibers = {**_cut_names(own), **cut_fibers}
+        for own in scripts:
+            own.cut_fibers = cut_fibers
+        for line, what in parts[0][0]["broken"]:
+            if not what.startswith("new "):
+                first.stages.append((line, f"{what}, before the first run", FILAMENTS_CHANGE))
         for number, part in enumerate(parts):
             if part is not chosen:
                 # What lies between it and those that are taken.
@@ -187,6 +205,11 @@ class _Follower:
                 before["frames"] += frames
                 continue
             broken, known = script.broken[known:], len(script.broken)
+            for new in script.created:
+                if broken or not parts:
+                    new.late = False
+                elif new.late is None:
+                    new.late = True
             run = {"number": number, "settings": settings, "steps": steps, "frames": frames, "broken": broken}
             if parts and not broken:
                 parts[-1].append(run)
@@ -262,6 +285,25 @@ class _Follower:
                     script.created.remove(new)
 
         return self._add(command, what, delete)
+
+    def _do_cut(self, command):
+        words = [word for word in command.words if word != "all"]
+        settings = Settings.of("cut", command.line, command.block)
+        what = f"cut {' '.join(command.words)}"
+
+        def cut(script):
+            name = words[-1] if words else "*"
+            known = [new for new in script.created if new.kind == "fiber"]
+            numbers = [place for place, own in enumerate(known) if name in (own.name, own.kind, "*")]
+            some = any(word.isdigit() for word in words) or settings.peek("plane") == "random"
+            # What is cut grows, and cannot come between runs of one part.
+            comes = any(known[number].late is not False for number in numbers)
+            if some or comes or _begins_fibers(script):
+                script.broken.append((command.line, what))
+            if numbers and not some:
+                script.cuts.append((numbers, settings))
+
+        return self._add(command, what, cut)
 
     def _do_set(self, command):
         words = [word for word in " ".join(command.words).replace(":", " ").split() if not word.isdigit()]
@@ -341,7 +383,8 @@ class _Follower:
             count = first if first.startswith("[") else int(first)
             script.created.append(New(count, own, name, settings, command.line))
             fibers = script.properties.get(settings.text(("fibers", 1))) if own == "aster" else None
-            if (own == "fiber" and _grows(script.properties[name])) or (fibers is not None and _grows(fibers)):
+            grows = own == "fiber" and (_grows(script.properties[name]) or name in _cut_names(script))
+            if grows or (fibers is not None and _grows(fibers)):
                 script.broken.append((command.line, f"new {' '.join(words)}, which grows"))
 
         return self._add(command, f"new {' '.join(words)}", create)
@@ -414,6 +457,12 @@ def _begins_fibers(script):
     return any(new.kind == "event" for new in script.created) or any(
         settings.peek("activity") == "nucleate" for settings in hands
     )
+
+
+def _cut_names(script):
+    # The settings of planes by the names of fibers that they cut.
+    known = [new for new in script.created if new.kind == "fiber"]
+    return {known[number].name: settings for numbers, settings in reversed(script.cuts) for number in numbers}
 
 
 def _delete_fibers(script, fibers, known, count):

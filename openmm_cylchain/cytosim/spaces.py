@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..couplings.shapes import prism_faces
+from ..errors import InputError
 from .document import point, quantity
 from .settings import as_vector
 
@@ -22,8 +24,6 @@ _NAMES = {
 _FLAT = 1.0
 """Half the thickness in um of walls and regions around a plane, in which nothing is at another height."""
 _DRAWS = 100_000
-_IN_LINE = 1e-9
-"""Angle by which sides of a polygon turn that are in a line."""
 
 
 @dataclass
@@ -327,39 +327,22 @@ def _polygon(sizes, dimensions):
         within = np.sum(crosses & (x < where), -1) % 2 == 1
         return within & (np.abs(at[..., 2]) <= 0.5 * height)
 
-    signed = 0.5 * float(np.sum(first[:, 0] * last[:, 1] - last[:, 0] * first[:, 1]))
-    area = abs(signed)
+    area = abs(0.5 * float(np.sum(first[:, 0] * last[:, 1] - last[:, 0] * first[:, 1])))
     half, middle = np.array([*(0.5 * (high - low)), 0.5 * height]), np.array([*(0.5 * (high + low)), 0.0])
     volume = area if dimensions == 2 else area * height
-    return Space("polygon", half, inside, volume, None, _sides(first, last, signed, height), middle=middle)
+    return Space("polygon", half, inside, volume, None, _prism(corners, height), middle=middle)
 
 
-def _sides(first, last, area, height):
-    # Those of a prism over a convex polygon, and of no other: None. Corners in a line have one side.
-    ways = (last - first) * np.sign(area)
-    lengths = np.linalg.norm(ways, axis=1, keepdims=True)
-    if not np.all(lengths > 0.0):
+def _prism(corners, height):
+    # None unless it is convex.
+    try:
+        prism_faces(corners)
+    except InputError:
         return None
-    ways = ways / lengths
-    following = np.roll(ways, -1, axis=0)
-    turns = np.arctan2(ways[:, 0] * following[:, 1] - ways[:, 1] * following[:, 0], np.sum(ways * following, axis=1))
-    if np.sign(area) < 0.0:
-        # The sides come one after the other the other way round.
-        turns = -turns
-    if np.any(turns < -_IN_LINE) or not math.isclose(float(turns.sum()), 2.0 * math.pi, rel_tol=1e-6):
-        return None
-    walls = [
-        {
-            "shape": "plane",
-            "point": point([*corner, 0.0]),
-            "normal": [round(-float(way[1]), 12) + 0.0, round(float(way[0]), 12) + 0.0, 0],
-        }
-        for corner, way, turn in zip(first, ways, np.roll(turns, 1))
-        if turn > _IN_LINE
-    ]
+    wall = {"shape": "prism", "corners": [point(corner) for corner in corners]}
     if height:
-        walls.append({"shape": "slit", "point": point([0.0] * 3), "thickness": quantity(height, "um")})
-    return walls
+        wall |= {"bottom": quantity(-0.5 * height, "um"), "top": quantity(0.5 * height, "um")}
+    return [wall]
 
 
 def _dice(sizes, dimensions):

@@ -1,6 +1,7 @@
 """Several runs of Cytosim as [[stage]] tables: what differs from one translated configuration to the next."""
 
 import copy
+import itertools
 
 from ..runs.tables.stages import CHANGES, STAYS
 from .document import EXACT, LEFT_OUT, NEAREST, Note, number_in
@@ -22,7 +23,7 @@ _PLACES = ("position", "inside", "direction", "orientation", "nodes", "tangents"
 _NEEDS = "stages: {}"
 
 
-def add_stages(document, later, runs, unbound, deleted):
+def add_stages(document, later, runs, unbound, deleted, cuts):
     """Make a Document of the first run one of all.
 
     Parameters
@@ -37,6 +38,8 @@ def add_stages(document, later, runs, unbound, deleted):
         Of later runs: which unbound hands have taken their linkers away before, by names.
     deleted : list of dict
         Of later runs: how many filaments go before, None for all, by numbers of their tables.
+    cuts : list of dict
+        Of later runs: the planes that cut filaments before, by numbers of their tables.
     """
     stages = [_plain(own) for own in (document, *later)]
     simulation = document.tables_called("[simulation]")[0]
@@ -59,7 +62,16 @@ def add_stages(document, later, runs, unbound, deleted):
         table.add("name", f"run {number + 1}")
         table.add("duration", duration, Note(EXACT, f"run {number + 1}", run.line))
         if number:
-            _add_changes(document, stages[number - 1], own, run.line, unbound[number - 1], deleted[number - 1])
+            _add_changes(document, stages[number - 1], own, run.line, unbound[number - 1])
+            for index, count in deleted[number - 1].items():
+                _add_table(
+                    document, f"[stage.filament.{index + 1}]", {"delete": {} if count is None else {"count": count}}
+                )
+            if cuts[number - 1] and document.tables_called("[box]"):
+                document.note(LEFT_OUT, "planes that cut", run.line, _NEEDS.format("cuts in a periodic box"))
+                cuts[number - 1].clear()
+            for index, planes in cuts[number - 1].items():
+                _add_table(document, f"[stage.filament.{index + 1}]", {"cut": planes})
 
 
 def _plain(document):
@@ -179,7 +191,7 @@ def _name_all_held(stages, document):
             table.add("holds", stages[0]["wall"][index]["holds"], Note(EXACT, "all"))
 
 
-def _add_changes(document, before, after, line, unbound, deleted):
+def _add_changes(document, before, after, line, unbound):
     for name in dict.fromkeys((*before, *after)):
         if name in ("title", "stage"):
             continue
@@ -191,6 +203,9 @@ def _add_changes(document, before, after, line, unbound, deleted):
         for index, (first, second) in enumerate(pairs):
             if name in ("contacts", "flow") and second == {}:
                 change = {"active": False} if first and first.get("active", True) else {}
+            elif first.get("shape") != second.get("shape"):
+                change = {}
+                _leave_out(document, f"another shape of {name}", line, "shape")
             else:
                 change = _change(document, name, first, second, line)
             if name == "linkers":
@@ -201,14 +216,14 @@ def _add_changes(document, before, after, line, unbound, deleted):
                     if len(gone) == 1:
                         text = f"{second['name']} that go if {', '.join(gone)} = 0: here if no hand is bound"
                         document.note(NEAREST, text, line)
-            if name == "filament" and index in deleted:
-                change["delete"] = {} if deleted[index] is None else {"count": deleted[index]}
             if change:
                 _add_table(document, f"[stage.{name}.{index + 1}]" if name in _REPEATED else f"[stage.{name}]", change)
 
 
 def _add_table(document, header, change):
-    table = document.table(header)
+    # To one of the same stage, if there is one.
+    of_stage = list(itertools.takewhile(lambda own: own.header != "[[stage]]", reversed(document.tables)))
+    table = next((own for own in of_stage if own.header == header), None) or document.table(header)
     for key, value in change.items():
         table.add(key, value)
 

@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import InputError
 from .bodies import KINDS as BODY_KINDS
 from .bodies import add_bodies
-from .document import LEFT_OUT, NEAREST, Document
+from .document import LEFT_OUT, NEAREST, Document, point
 from .drawing import Draw
 from .filaments import add_filaments
 from .growth import add_monomers
@@ -175,17 +175,19 @@ class Translation:
         self._translate_run()
         if self.script.later:
             stem, dimensions, folder = self._path
-            later, deleted = [], []
+            later, deleted, cuts = [], [], []
             for script in self.script.later:
                 own = Translation(script, self.document.title, stem, dimensions, folder, self.duration)
                 own._translate_run()
                 later.append(own.document)
                 deleted.append(_deletions(script, own.tables_of_fibers))
+                cuts.append(_cuts(script, own.tables_of_fibers))
                 # Those of filaments that come later.
                 self.start_files.update({**own.start_files, **self.start_files})
                 self.made = max(self.made, own.made, key=len)
             unbound = [own.unbound for own in self.script.later]
-            add_stages(self.document, later, [own.run for own in (self.script, *self.script.later)], unbound, deleted)
+            runs = [own.run for own in (self.script, *self.script.later)]
+            add_stages(self.document, later, runs, unbound, deleted, cuts)
 
     def _translate_run(self):
         # What is there when a run begins.
@@ -285,6 +287,20 @@ def _deletions(script, tables):
             share = None if count is None else (count + len(own) - 1 - place) // len(own)
             found[table] = None if share is None or found.get(table, 0) is None else found.get(table, 0) + share
     return {table: count for table, count in found.items() if count != 0}
+
+
+def _cuts(script, tables):
+    # By numbers of [[filament]] tables: the planes that cut as the run begins, n.x + a = 0.
+    found = {}
+    for numbers, settings in script.cuts:
+        normal = np.array(settings.vector("plane", default=(1.0, 0.0, 0.0)))
+        if not normal.any():
+            raise settings.mistake("plane", "must have a normal that is not zero.")
+        point_on = -settings.number(("plane", 1), default=0.0) * normal / (normal @ normal)
+        for number in numbers:
+            for table in tables[number]:
+                found.setdefault(table, []).append({"point": point(point_on), "normal": normal.tolist()})
+    return found
 
 
 def translate(path, stem, dimensions=None, given=None):

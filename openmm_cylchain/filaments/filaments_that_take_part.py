@@ -44,7 +44,8 @@ class FilamentsThatTakePart:
     @property
     def bead_indices(self) -> list[IntArray]:
         """Of their beads."""
-        return [self._filaments.bead_indices[number] for number in self.numbers]
+        every = self._filaments.bead_indices
+        return [every[number] for number in self.numbers]
 
     @property
     def attachments(self) -> tuple[Attachment, ...]:

@@ -8,6 +8,8 @@ import numpy as np
 import openmm
 from openmm import unit
 
+from ..couplings.periodicity import is_periodic
+from ..couplings.shapes import Plane
 from ..engine_choice import load_plugin
 from ..errors import InputError
 from ..filaments.end_states import ENDS, SHRINKING
@@ -270,6 +272,22 @@ def set_growth_of(context: openmm.Context, filaments: Sequence[Filament], monome
         force.setGrowthInContext(context, ends.ravel().tolist())
     except openmm.OpenMMException as error:
         raise InputError(str(error)) from None
+
+
+def cut_by(context: openmm.Context, plane: Plane, numbers: Sequence[int] | None) -> tuple[int, int]:
+    """Cut filaments of a Context by a plane, all that grow if numbers is None: at how many places they go through it,
+    and how often they were cut."""
+    if is_periodic(context.getSystem()):
+        raise InputError("In a periodic box, a plane would not cut the images of filaments: cut them without one.")
+    force = find_growth_force(context.getSystem())
+    indices = {force.getGrowingChainParameters(index)[0]: index for index in range(force.getNumGrowingChains())}
+    for number in numbers or ():
+        if number not in indices:
+            raise InputError(f"Filament {number} cannot be cut: it does not grow, or does not exist.")
+    chosen = list(indices.values()) if numbers is None else [indices[number] for number in numbers]
+    before = force.getPopulationInContext(context)[1][2]
+    places = force.cutInContext(context, openmm.Vec3(*plane.point), openmm.Vec3(*plane.normal), chosen)
+    return places, int(force.getPopulationInContext(context)[1][2] - before)
 
 
 def contours_in(context: openmm.Context, filaments: Sequence[Filament]) -> list[FloatArray]:

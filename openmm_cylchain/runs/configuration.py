@@ -36,7 +36,7 @@ from .tables.couplings import (
     read_link,
     read_pull,
     read_tether,
-    read_wall,
+    read_walls,
 )
 from .tables.filament import FILAMENT, MOST_NODES, read_filaments, read_reserve
 from .tables.filament_types import PRESETS as PRESETS
@@ -205,7 +205,7 @@ def configuration_of(entries, text, folder, lines):
         else:
             found = _configuration(entries, text, Path(folder), lines)
         for own in found.tables["filament"]:
-            own.refuse(("delete",), "belongs to a [[stage]] behind the first one: write [stage.filament] there.")
+            own.refuse(("delete", "cut"), "belongs to a [[stage]] behind the first one: write [stage.filament] there.")
         return found
     except UnknownKeyError as error:
         raise error.with_suggestion(_OWNERS).with_line(lines) from None
@@ -226,7 +226,7 @@ def _configuration(raw, text, folder, lines):
     (solvent,) = map(read_solvent, tables["solvent"])
     box = tables["box"][0]["edges"] if tables["box"] else None
     (settings,) = tables["simulation"]
-    walls = tuple(map(read_wall, tables["wall"]))
+    walls = tuple(wall for own in tables["wall"] for wall in read_walls(own))
     monomers = tuple(read_monomers(own, box, walls) for own in tables["monomers"])
     check_names(tables["monomers"], monomers)
     groups = _filaments(tables, solvent, box, folder, monomers)

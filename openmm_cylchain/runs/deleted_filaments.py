@@ -1,4 +1,4 @@
-"""Filaments that a stage deletes as it begins: which ones, and what can hold none of them."""
+"""Filaments that a stage deletes or cuts as it begins: which ones, and what can hold none of them."""
 
 import numpy as np
 from openmm import unit
@@ -29,18 +29,36 @@ def deleted_filaments(stage, current, seed):
         return frozenset()
     positions = simulation.context.getState(positions=True).getPositions(asNumpy=True).value_in_unit(unit.nanometer)
     nodes = _nodes_that_are_there(simulation.context, built.filaments)
-    members, first = {table: [] for table in tables}, 0
-    for group in stage.configuration.filaments:
-        there = (number for number in range(first, first + group.count) if len(nodes[number]))
-        members.get(group.table, []).extend(there)
-        first += group.count
+    members = _numbers_of_tables(stage.configuration)
     box = None if stage.configuration.box is None else np.array(stage.configuration.box)
     gone = set()
-    for table, numbers in members.items():
+    for table, deletion in tables.items():
+        numbers = [number for number in members[table] if len(nodes[number])]
         middles = np.array([positions[nodes[number]].mean(axis=0) for number in numbers]).reshape(-1, 3)
         generator = np.random.default_rng([seed, stage.number, _SEED, table])
-        gone.update(numbers[place] for place in tables[table].chosen(middles, box, generator))
+        gone.update(numbers[place] for place in deletion.chosen(middles, box, generator))
     return frozenset(gone)
+
+
+def cut_filaments(stage, current):
+    """Cut filaments in the Simulation of a Stage and its BuiltSystem, as it begins, by the planes that it has.
+
+    They are those of a table, with the parts of these and those that have begun by nucleation.
+    """
+    tables = {} if stage.is_piece else {own.table: own.cuts for own in stage.configuration.filaments if own.cuts}
+    simulation, built = current
+    members = _numbers_of_tables(stage.configuration)
+    for table, planes in tables.items():
+        for plane in planes:
+            built.filaments.in_context(simulation.context).cut(plane, members[table])
+
+
+def _numbers_of_tables(configuration):
+    members, first = {}, 0
+    for group in configuration.filaments:
+        members.setdefault(group.table, []).extend(range(first, first + group.count))
+        first += group.count
+    return members
 
 
 def _nodes_that_are_there(context, filaments):

@@ -95,7 +95,9 @@ def build_system(configuration, engine, seed, kinetics=True, begun=None, deleted
             )
         system.addForce(force)
     names = [own.name for own in configuration.particles for _ in range(own.count)]
-    for own, entries in zip(configuration.walls, tables["wall"]):
+    of_walls = {entries.place.path[1]: entries for entries in tables["wall"]}
+    for own in configuration.walls:
+        entries = of_walls[own.number]
         held = [number for number, name in enumerate(names) if own.held_types is None or name in own.held_types]
         most = 1 if own.nodes == "first" else None
         bodies = [group for group in configuration.bodies if own.holds(group.body)]

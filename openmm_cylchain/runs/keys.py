@@ -420,7 +420,9 @@ class Inline:
 
     def read(self, value, place):
         if not isinstance(value, dict):
-            raise place.error(f"must be a table, as in {place.path[-1]} = {self.example}, but is {as_written(value)}.")
+            name = place.path[-1]
+            example = f"{name} = {self.example}" if isinstance(name, str) else self.example
+            raise place.error(f"must be a table, as in {example}, but is {as_written(value)}.")
         return self.table.read(value, place)
 
     def schema(self):

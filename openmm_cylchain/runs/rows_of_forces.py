@@ -19,14 +19,16 @@ class RowsOfForces:
     """
 
     def __init__(self, stages, configuration):
-        self._walls = [own.number for own in configuration.walls]
-        faces = {own.number: len(own.shape.faces) for stage in stages for own in stage.configuration.walls}
-        self._faces = [(number, face) for number in sorted(faces) for face in range(faces[number])]
-        self.there = bool(faces), any(stage.configuration.contacts_of_filaments for stage in stages)
+        self._walls = configuration.walls
+        every = (own for stage in stages for own in stage.configuration.walls)
+        self._faces = sorted({(own.number, face) for own in every for face in own.faces})
+        self.there = bool(self._faces), any(stage.configuration.contacts_of_filaments for stage in stages)
 
     def of(self, walls, contacts, filaments):
         """Rows of walls, each with its wall and face, and of contacts; see ``ForceTables.write_rows``."""
-        known = {(self._walls[wall], face): row for (wall, face), row in zip(*rows_of_walls(walls))}
+        known = {}
+        for (wall, face), row in zip(*rows_of_walls(walls)):
+            known[self._walls[wall].number, self._walls[wall].faces[face]] = row
         rows = [(place, known.get(place, _NONE)) for place in self._faces]
         if not self.there[1]:
             return rows, ()

@@ -42,7 +42,7 @@ def as_summarised(configuration):
     if not configuration.stages:
         return configuration
     every = [own.configuration for own in configuration.stages]
-    walls = {wall.number: wall for own in every for wall in own.walls}
+    walls = {(wall.number, wall.first_face): wall for own in every for wall in own.walls}
     contacts = [own.contacts for own in every if own.contacts is not None]
     return dataclasses.replace(
         every[-1],

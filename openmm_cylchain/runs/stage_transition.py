@@ -10,7 +10,7 @@ import numpy as np
 
 from ..systems.carried_state import carry_state
 from .created_simulation import stage_simulation
-from .deleted_filaments import deleted_filaments
+from .deleted_filaments import cut_filaments, deleted_filaments
 from .relaxation import relaxed_again
 from .tables.linkers import KEPT
 
@@ -54,6 +54,7 @@ def following_simulation(before, stage, first, seed):
     if have_come and stage.configuration.relaxes and all(own.growth is None for own in built.filaments):
         positions = new.context.getState(positions=True).getPositions(asNumpy=True)
         new.context.setPositions(relaxed_again(stage.configuration, built.filaments, positions, built.deleted))
+    cut_filaments(stage, (new, built))
     return new, built
 
 

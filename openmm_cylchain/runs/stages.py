@@ -21,7 +21,7 @@ from .table import UnknownKeyError
 from .tables.stages import STAGE
 
 _MOST_STAGES = 10**5
-_AT_THE_BEGINNING = {"linkers": ("bound", "bound_at", "keep"), "filament": ("delete",)}
+_AT_THE_BEGINNING = {"linkers": ("bound", "bound_at", "keep"), "filament": ("delete", "cut")}
 _DURATION = ("simulation", "duration")
 
 
@@ -189,10 +189,11 @@ def read_stages(raw, kinds, read):
     for leaf in _leaves(raw[STAGE.name], ("stage",), "", itertools.count(1)):
         changes = apply_stage(_as_they_are(tables) if stages else tables, leaf.table, leaf.place, kinds)
         for path, origin in changes.origins.items():
-            if path[0] == "filament" and path[2:] == ("delete",):
+            if path[0] == "filament" and path[2:] in (("delete",), ("cut",)):
                 if not stages:
                     raise origin.error("belongs to a later stage: in the first one, all begin that the file has.")
-                thinned.add(path[1] + 1)
+                if path[2] == "delete":
+                    thinned.add(path[1] + 1)
         pieces = _pieces(leaf, changes)
         for piece in range(pieces):
             own = changes.resolved((piece + 0.5) / pieces)

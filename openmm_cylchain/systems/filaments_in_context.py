@@ -10,6 +10,7 @@ import openmm
 from openmm import unit
 
 from ..couplings.beam_curves import BeamCurves
+from ..couplings.shapes import Plane
 from ..engines.compiled_twist import set_twists_of, twists_of
 from ..engines.description import describe_chains
 from ..engines.protocol import Engine, PlacedFilaments
@@ -25,7 +26,7 @@ from ..kinetics.binding_force import (
     set_table,
     table_of,
 )
-from ..kinetics.growth_force import FilamentGrowth, contours_in, growth_of, set_growth_of
+from ..kinetics.growth_force import FilamentGrowth, contours_in, cut_by, growth_of, set_growth_of
 from ..kinetics.linker_table import LinkerTable
 from ..kinetics.linkers import LinkerPulls
 from ..mechanics.flow import Flow
@@ -104,6 +105,42 @@ class FilamentsInContext:
         """
         self._refuse_if_none_grows()
         set_growth_of(self._context, self._placed.filaments, monomers)
+
+    def cut(self, plane: Plane, numbers: Indices | None = None) -> tuple[int, int]:
+        """Cut filaments that grow, at once, wherever they go through a plane, as a laser does.
+
+        A cut is between the two monomers that are nearest, and both parts are filaments then, with new ends as
+        ``Growth.severing`` says, in the places that ``Filaments.add_reserve`` has added. What is bound stays where it
+        is. A filament stays whole where there is no place for a part, where a part would be shorter than the
+        ``shortest``, unless filaments vanish, and where what is cut off would be clamped or held by a tether.
+
+        Parameters
+        ----------
+        plane : Plane
+            Without an end; which way its normal points means nothing.
+        numbers : sequence of int, optional
+            Of the filaments that are cut; all that grow if not given.
+
+        Returns
+        -------
+        places, cuts : int
+            At how many places filaments go through the plane, and at how many of them they were cut.
+
+        Raises
+        ------
+        InputError
+            If none of them grow, for numbers of filaments that do not grow, and in a periodic box.
+
+        Examples
+        --------
+        >>> filaments.in_context(context).cut(Plane([0, 0, 0], [1, 0, 0]))  # doctest: +SKIP
+        """
+        self._refuse_if_none_grows()
+        require_kind(plane, Plane, "plane")
+        if numbers is not None:
+            numbers = whole_numbers(numbers, 0, "numbers")
+        with naming_unknown_linkers():
+            return cut_by(self._context, plane, numbers)
 
     def _refuse_if_none_grows(self):
         if not any(filament.growth is not None for filament in self._placed.filaments):

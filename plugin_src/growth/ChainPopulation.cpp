@@ -7,6 +7,9 @@
 using namespace cylchain;
 using namespace std;
 
+/** How often ends are drawn at a place that a plane cuts. */
+static const int MOST_TRIALS = 100;
+
 void ChainPopulation::listNucleation(const GrowthState& state, int number, vector<GrowthEvent>& events) const {
     const Nucleator& nucleator = system.nucleators[number];
     if (nucleator.chains.empty())
@@ -245,6 +248,32 @@ bool ChainPopulation::mayCut(GrowthState& state, int index, int monomer, double 
     const int found = number == state.ranges[index].size()-1 ? state.endStates[2*index+1] :
             monomers.revealAt(number, time, random);
     return random.uniform() < own.severing.shares[found];
+}
+
+void ChainPopulation::cutByPlane(GrowthState& state, const GrowthStep& step, int index, RandomNumbers& random,
+        ChainsInStep& chains, GrowthChanges& changes) {
+    const vector<Vec3d> nodes = chains.getNodes(index);
+    const vector<double> along = shapes.findLengths(index, state.ranges[index]);
+    auto findHeight = [&] (size_t node) {
+        return (nodes[node]-step.plane->point).dot(step.plane->normal);
+    };
+    // From its plus end on: what is before a cut stays this chain.
+    for (size_t segment = nodes.size()-1; segment-- > 0;) {
+        const double first = findHeight(segment), second = findHeight(segment+1);
+        if ((first < 0) == (second < 0))
+            continue;
+        const double place = along[segment]+(along[segment+1]-along[segment])*first/(first-second);
+        GrowthEvent cut = {GrowthEvent::Sever, index, 0};
+        cut.monomer = static_cast<int>(round(place/shapes.getMonomerLength(index)));
+        if (cut.monomer <= state.ranges[index].first || cut.monomer >= state.ranges[index].last)
+            continue;
+        changes.crossings++;
+        // Energies are those of what is around the ends that are drawn there.
+        const PopulationEvents before = state.population;
+        for (int trial = 0; trial < MOST_TRIALS && state.population.severed == before.severed &&
+                state.population.waited == before.waited; trial++)
+            sever(state, step, cut, state.time, random, chains, changes);
+    }
 }
 
 int ChainPopulation::sever(GrowthState& state, const GrowthStep& step, const GrowthEvent& event, double time,

@@ -33,6 +33,11 @@ public:
      */
     int apply(GrowthState& state, const GrowthStep& step, const GrowthEvent& event, double time, RandomNumbers& random,
             ChainsInStep& chains, GrowthChanges& changes);
+    /**
+     * Cut a chain wherever it goes through the plane of a step, where both parts may be and there is a chain for one.
+     */
+    void cutByPlane(GrowthState& state, const GrowthStep& step, int index, RandomNumbers& random,
+            ChainsInStep& chains, GrowthChanges& changes);
 private:
     /** A side of a chain that is cut: its nodes and lengths along it before its segments are those of its monomers. */
     struct CutSide {

@@ -201,6 +201,12 @@ struct GrowthState {
     }
 };
 
+/** A plane, and the chains that are cut where they go through it, by their numbers among those that grow. */
+struct CuttingPlane {
+    Vec3d point, normal;
+    std::vector<int> chains;
+};
+
 /** A step in which chains grow. */
 struct GrowthStep {
     double kT, stepSize;
@@ -210,6 +216,8 @@ struct GrowthStep {
     bool takesNearestImages = false;
     /** Hands that cut. */
     std::vector<SeveringHand> severingHands = {};
+    /** What cuts at its beginning, or nothing. */
+    const CuttingPlane* plane = nullptr;
 };
 
 /** A chain that has begun as a branch. */
@@ -229,6 +237,8 @@ struct GrowthChanges {
     /** Where chains were cut, or have vanished, one after the other. */
     std::vector<ChainCut> cuts;
     std::vector<ChainBranch> branches;
+    /** At how many places chains have gone through the plane that cuts. */
+    int crossings = 0;
     /** The number of a growing chain the rates of which are too large for the step, or -1. */
     int failed = -1;
 };

@@ -22,6 +22,7 @@ from openmm_cylchain import (
     Torus,
     constant_force,
     filament_wall_force,
+    prism_faces,
     wall_force,
     wall_forces,
 )
@@ -283,7 +284,8 @@ def _with_particles(heights, friction, step, wall):
     _, system, positions = filaments.build()
     particles = [system.addParticle(1.0) for _ in heights]
     points = np.column_stack([np.zeros((len(heights), 2)), heights])
-    system.addForce(filament_wall_force(filaments, system, wall, 20.0, particles=particles))
+    for own in wall if isinstance(wall, tuple) else (wall,):
+        system.addForce(filament_wall_force(filaments, system, own, 20.0, particles=particles))
     integrator = filaments.create_integrator(system, step, random_seed=5, particle_friction=friction, checks=False)
     return new_context(system, np.vstack([positions._value, points]), integrator), integrator, len(positions)
 
@@ -308,6 +310,30 @@ def test_pressure_of_free_particles():
     assert 4 * error < 0.04 * expected
     assert abs(np.mean(pushes) - expected) < 0.03 * expected
     assert np.sqrt(2 * KT * step / friction) > 60 * np.sqrt(KT / 20.0)
+
+
+@pytest.mark.slow
+def test_particles_in_a_prism():
+    """Energies at its sides and corners, and the mean place, from quadrature."""
+    faces = prism_faces([[-2.0, -1.0], [2.5, -1.0], [-2.0, 2.0]])
+    places = 12.0 * (np.arange(600) + 0.5) / 600 - 6.0
+    grid = np.stack(np.meshgrid(places, places, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
+    energies = 10.0 * sum(face.square_depth(grid) for face in faces)
+    weights = np.exp(-energies / KT)
+    weights /= weights.sum()
+    expected = weights @ np.column_stack([energies, grid[:, :2]])
+    context, integrator, first = _with_particles(np.zeros(800), 3.4e5, 4e4, faces)
+    start = positions_of(context)
+    start[first:] = np.random.default_rng(2).choice(grid, 800, p=weights)
+    context.setPositions(start)
+    found = []
+    for _ in range(40):
+        integrator.step(15)
+        now = positions_of(context)[first:]
+        found.append([10.0 * sum(face.square_depth(now) for face in faces).mean(), *now[:, :2].mean(axis=0)])
+    error = np.std(found, axis=0, ddof=1) / np.sqrt(len(found))
+    assert np.all(4 * error < [0.05 * expected[0], 0.06, 0.05])
+    assert np.all(np.abs(np.mean(found, axis=0) - expected) < 4 * error), (np.mean(found, axis=0), expected, error)
 
 
 def test_density_of_free_particles_is_even():

@@ -5,7 +5,7 @@ import openmm
 import pytest
 from openmm import unit
 
-from openmm_cylchain import F_ACTIN, Filaments, InputError
+from openmm_cylchain import F_ACTIN, Filaments, InputError, prism_faces
 from openmm_cylchain.couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, Torus
 from openmm_cylchain.couplings.walls import wall_force
 from support.contexts import new_context, positions_of
@@ -36,6 +36,41 @@ def test_depth_is_the_distance_from_the_inside(shape):
         # Random points leave gaps of about 0.2 nm; that of an ellipsoid is a distance to first order only.
         tolerance = 0.2 if not isinstance(shape, Ellipsoid) else 0.2 + 0.5 * depths[index]
         assert depths[index] == pytest.approx(distance(shape, points[index]), abs=tolerance)
+
+
+@pytest.mark.parametrize("backward", [False, True])
+def test_faces_of_a_prism(backward):
+    """Over a rectangle they are those of a box, and over a polygon each side has what is beyond it by its distance."""
+    points = np.random.default_rng(4).uniform(-4, 4, size=(500, 3))
+    corners = np.array([[-1.0, -2.0], [0.5, -2.0], [2.0, -2.0], [2.0, 1.0], [-1.0, 1.0]])
+    faces = prism_faces(corners[::-1] if backward else corners, -1 * unit.nanometer, 3)
+    assert [type(face) for face in faces] == [Plane] * 4 + [Slab]
+    total = sum(face.square_depth(points) for face in faces)
+    np.testing.assert_allclose(total, Box([-1, -2, -1], [2, 1, 3]).square_depth(points), atol=1e-12)
+    angles = 2 * np.pi * np.arange(400) / 400
+    many = prism_faces(3.0 * np.column_stack([np.cos(angles), np.sin(angles)])[:: -1 if backward else 1])
+    inside = np.all([face.square_depth(points) == 0.0 for face in many], axis=0)
+    distances = np.hypot(points[:, 0], points[:, 1])
+    np.testing.assert_array_equal(inside, distances < 3.0)
+    deepest = np.sqrt(np.max([face.square_depth(points) for face in many], axis=0))
+    np.testing.assert_allclose(deepest, np.maximum(0.0, distances - 3.0), atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("corners", "ends", "message"),
+    [
+        ([[0, 0], [1, 0]], {}, "must have the shape"),
+        ([[0, 0], [1, 0], [1, 0], [0, 1]], {}, "Corner 1 and the next one are in one place"),
+        ([[0, 0], [3, 0], [3, 1], [1, 1], [1, 3], [0, 3]], {}, "those of a convex polygon"),
+        ([[0, 3], [2, -2], [-3, 1], [3, 1], [-2, -2]], {}, "those of a convex polygon"),
+        ([[0, 0], [1, 0], [2, 0]], {}, "those of a convex polygon"),
+        ([[0, 0], [1, 0], [0, 1]], {"top": 1}, "both a bottom and a top"),
+        ([[0, 0], [1, 0], [0, 1]], {"bottom": 1, "top": 1}, "top must be above bottom"),
+    ],
+)
+def test_no_prisms(corners, ends, message):
+    with pytest.raises(InputError, match=message):
+        prism_faces(corners, **ends)
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=_name)

@@ -132,7 +132,7 @@ PARTS = (
     "run 100 system { nb_frames = 2 }\n"
     "change system { time_step = 0.02 }\nnew 4 link { mark = 1 }\nrun 50 system\nreport fiber x\nrun 25 system\n"
     "delete 2 link\nrun 60 system\ndelete link { mark = 1 }\ndelete link { state1 = 0 }\nrun 70 system\n"
-    "cut actin { plane = 1 0 0, 0 }\nrun 20 system\n"
+    "cut 1 actin { plane = 1 0 0, 0 }\nrun 20 system\n"
 )
 
 
@@ -147,10 +147,12 @@ def test_runs_are_stages_and_apart_where_fibers_come_or_are_cut(tmp_path):
     # Of those with the mark, the ones that were left; first those that came first.
     assert links == [5, 9, 7, 3]
     assert [own.unbound for own in every] == [{}, {}, {}, {"link": {"state1"}}]
-    assert [needs for *_, needs in script.stages] == ["stages: filaments that go, are cut, or come and grow"] * 2
+    assert [needs for *_, needs in script.stages] == [
+        "stages: filaments that go by where they are, or come and grow"
+    ] * 2
     assert [text for _, text, _ in script.stages] == [
         "10 steps of other runs, apart by delete 1 actin",
-        "20 steps of other runs, apart by cut actin",
+        "20 steps of other runs, apart by cut 1 actin",
     ]
 
 

@@ -544,7 +544,7 @@ def test_parts_and_fields_are_said(tmp_path):
     text = TUBE + "new tube\nset field ball { confine = off }\nnew ball\nrun 5000 system\ncut tube\n"
     text += "new tube\n"
     _, document = translated(tmp_path, text)
-    assert document.missing == ["stages: filaments that go, are cut, or come and grow", "fields"]
+    assert document.missing == ["stages: filaments that go by where they are, or come and grow", "fields"]
 
 
 def test_runs_become_stages(tmp_path):
@@ -652,7 +652,7 @@ def test_fibers_that_grow_do_not_come_with_a_run(tmp_path):
     text = TUBE.replace("segmentation", "activity = grow; growing_speed = 0.1; segmentation")
     found, document = translated(tmp_path, text + "new tube\nrun 5 system\nnew tube\n")
     assert not found.stages
-    assert document.missing == ["stages: filaments that go, are cut, or come and grow"]
+    assert document.missing == ["stages: filaments that go by where they are, or come and grow"]
 
 
 def test_fibers_go_with_a_run(tmp_path):
@@ -674,10 +674,35 @@ def test_fibers_go_with_a_run(tmp_path):
     found, document = translated(tmp_path, several)
     assert document.missing == []
     assert [own.delete.count for own in found.stages[1].configuration.filaments] == [2, 2]
-    for what in ("delete tube { position = inside, cell }", "cut tube { plane = 1 0 0, 0 }"):
+    for what in ("delete tube { position = inside, cell }", "cut 3 tube { plane = 1 0 0, 0 }"):
         found, document = translated(tmp_path, TUBE + f"new 4 tube {{ length = 3 }}\nrun 100 system\n{what}\n")
         assert not found.stages
-        assert document.missing == ["stages: filaments that go, are cut, or come and grow"]
+        assert document.missing == ["stages: filaments that go by where they are, or come and grow"]
+
+
+def test_planes_cut_fibers_between_runs(tmp_path):
+    """Where n.x + a = 0; of one name or all, several at once, also of fibers that grow."""
+    grown = TUBE.replace("fiber tube", "fiber micro").split("set fiber")[1]
+    grown = "set fiber" + grown.replace("segmentation", "activity = grow; growing_speed = 0.1; segmentation")
+    text = TUBE + grown + "new 4 tube { length = 3 }\nnew 2 micro { plus_end = grow }\nrun 100 system\n"
+    text += "cut tube { plane = 0 2 0, 1 }\n"
+    text += (
+        "cut fiber { plane = 1 0 0, -0.5; new_end_state = static, static }\nrun 50 system\ncut tube\nrun 50 system\n"
+    )
+    found, document = translated(tmp_path, text)
+    assert document.missing == ["growth: states of new ends"]
+    cuts = [[group.cuts for group in stage.configuration.filaments[:2]] for stage in found.stages]
+    assert [[len(own) for own in stage] for stage in cuts] == [[0, 0], [2, 1], [1, 0]]
+    first, second = cuts[1][0]
+    np.testing.assert_allclose((first.point, first.normal), ([0, -500, 0], [0, 1, 0]))
+    np.testing.assert_allclose((second.point, second.normal), ([500, 0, 0], [1, 0, 0]))
+    np.testing.assert_allclose(cuts[2][0][0].normal, [1, 0, 0])
+    growths = [group.growth for group in found.filaments]
+    assert all(own.severing is not None for own in growths) and growths[0].plus_capped and not growths[1].plus_capped
+    cell = "set space cell { shape = periodic }\nnew cell { length = 8, 8, 8 }\n"
+    found, document = translated(tmp_path, text, cell=cell)
+    assert not any(group.cuts for stage in found.stages for group in stage.configuration.filaments)
+    assert "stages: cuts in a periodic box" in document.missing
 
 
 @pytest.mark.parametrize(
@@ -699,6 +724,7 @@ def test_convex_polygons_have_planes(tmp_path, points, dimensions):
     assert 300 < within.sum() < 2700
     corners = {"order = 5": 5, "points = 0 0, 0": 4, "points = 0 0, 4": 3}
     assert len(found.walls) == next(own for name, own in corners.items() if points.startswith(name)) + dimensions - 2
+    assert len(document.tables_called("[[wall]]")) == 1
 
 
 @pytest.mark.parametrize("points", ["points = 0 0, 3 0, 3 1, 1 1, 1 3, 0 3", "points = 0 3, 2 -2, -3 1, 3 1, -2 -2"])

@@ -4,6 +4,7 @@ Against the law of mass action, quadrature of rods between walls, and the master
 """
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import openmm
@@ -20,10 +21,12 @@ from openmm_cylchain import (
     Filaments,
     Growth,
     Hand,
+    InputError,
     MonomerPool,
     Monomers,
     MonomerState,
     Nucleation,
+    Plane,
     Severing,
     Slab,
     Sphere,
@@ -416,6 +419,88 @@ def test_memory_stays_as_it_is():
     assert filaments.in_context(context).growth().nucleated - begun > 100000
     assert resident() - before < 4e6 and max(sizes) < 1.2 * min(sizes)
     tracemalloc.stop()
+
+
+def test_a_plane_cuts_filaments_where_they_go_through_it():
+    """At the nearest monomers, from both sides, again and again; all else stays to the bit, and hands with it."""
+    still = growth(0.0, 0.0, severing=Severing(rate=0.0), longest=2400.0, minus_capped=True, vanishes=False)
+    filaments = Filaments(WATER, TEMPERATURE)
+    soft = replace(ACTIN, bending_rigidity=400.0 * KT)
+    for number in range(30):
+        filaments.add_equilibrium(soft, 20, number + 1, start=[0, 0, 300.0 * number], growth=still)
+    filaments.add_reserve(soft, 200, growth=still)
+    hand = Hand(binding_rate=0.0, reach=10.0, unbinding_rate=0.0)
+    places = [(number, 72.0 * along) for number in range(30) for along in range(1, 30)]
+    kind = Crosslinker(hands=hand, stiffness=1.0, rest_length=0.0)
+    filaments.add_linkers(kind, len(places), volume=1e9, bound=len(places), places=places)
+    _, system, positions = filaments.build()
+    context = simulate(filaments, system, positions, 1e5)
+    context.getIntegrator().step(50)
+    here = filaments.in_context(context)
+    expected, others = set(), []
+    before = positions_of(context)
+    for number in range(30):
+        nodes = before[filaments.node_indices[number][:21]]
+        first, second = nodes[:-1, 0] - 300.0, nodes[1:, 0] - 300.0
+        for segment in np.flatnonzero((first < 0.0) != (second < 0.0)):
+            place = PER_SEGMENT * (segment + first[segment] / (first[segment] - second[segment]))
+            expected.add((number, round(place)))
+    expected = {own for own in expected if FEWEST <= own[1] <= 160 - FEWEST}
+    assert len(expected) > len({number for number, _ in expected}) > 10
+    hands = here.linkers()
+    found = here.cut(Plane([300, 0, 0], [2, 0, 0]))
+    state, after = here.growth(), positions_of(context)
+    assert found[0] >= found[1] == state.severed and state.without_place == 0
+    root = {own: number for number, own in enumerate(state.identities[:30])}
+    for own, parent in zip(state.identities, state.parents):
+        if parent >= 0:
+            root[own] = root[parent]
+    there = np.flatnonzero(state.nodes)
+    cuts = {(root[state.identities[own]], int(state.monomers[own, 0])) for own in there if state.parents[own] >= 0}
+    # Those that leave less than the fewest monomers between them are not.
+    assert cuts <= expected and len(cuts) == state.severed > 0.8 * len(expected)
+    for number in range(30):
+        parts = [own for own in there if root[state.identities[own]] == number]
+        monomers = state.monomers[parts][np.argsort(state.monomers[parts, 0])]
+        assert monomers[0, 0] == 0 and monomers[-1, 1] == 160
+        np.testing.assert_array_equal(monomers[1:, 0], monomers[:-1, 1])
+        if len(parts) == 1:
+            others.append(number)
+            own = filaments.node_indices[number]
+            np.testing.assert_array_equal(after[own], before[own])
+    assert 0 < len(others) < 20
+    moved = here.linkers()
+    np.testing.assert_array_equal(moved.arc_lengths, hands.arc_lengths)
+    for (was, _), (now, _), (place, _) in zip(hands.filaments, moved.filaments, moved.arc_lengths):
+        assert root[state.identities[now]] == was
+        first, last = state.monomers[now] * MONOMER
+        assert first <= place <= last
+    # All of what goes through the plane is where it was cut, or has been drawn there anew.
+    again = here.cut(Plane([300, 0, 0], [-1, 0, 0]), others)
+    assert again == (0, 0) or again[1] == 0
+    context.getIntegrator().step(50)
+    assert here.cut(Plane([0, 0, 4500], [0, 0, 1]), [0, 1]) == (0, 0)
+
+
+def test_what_planes_do_not_cut():
+    filaments = Filaments(WATER, TEMPERATURE)
+    still = growth(0.0, 0.0, severing=Severing(rate=0.0), vanishes=False)
+    filaments.add_straight(ACTIN, 5, [0, 0, 0], [1, 0, 0])
+    filaments.add_straight(ACTIN, 5, [0, 100, 0], [1, 0, 0], growth=still)
+    _, system, positions = filaments.build()
+    here = filaments.in_context(simulate(filaments, system, positions, 1e5))
+    middle = Plane([250, 0, 0], [1, 0, 0])
+    with pytest.raises(InputError, match="Filament 0 cannot be cut: it does not grow"):
+        here.cut(middle, [0])
+    with pytest.raises(InputError, match="plane must be an object of the class Plane"):
+        here.cut(Sphere([0, 0, 0], 100.0))
+    # There is no place for the part.
+    assert here.cut(middle) == (1, 0) and here.growth().without_place == 1
+    boxed = Filaments(WATER, TEMPERATURE)
+    boxed.add_straight(ACTIN, 5, [0, 100, 0], [1, 0, 0], growth=still)
+    _, system, positions = boxed.build(box_vectors=2000.0 * np.eye(3))
+    with pytest.raises(InputError, match="In a periodic box"):
+        boxed.in_context(simulate(boxed, system, positions, 1e5)).cut(middle)
 
 
 @pytest.mark.parametrize("severing", [None, Severing(rate=2e-9)])

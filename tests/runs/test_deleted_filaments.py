@@ -1,4 +1,4 @@
-"""Filaments that stages delete: which ones, and what happens to all that holds them."""
+"""Filaments that stages delete or cut: which ones, and what happens to all that holds them."""
 
 import json
 
@@ -110,11 +110,11 @@ def test_grown_filaments_go_with_their_monomers(tmp_path):
     run(parse_configuration(DELETING_GROWN), tmp_path / "out")
     found = analysis.load(tmp_path / "out")
     there = those_there(found)
-    first, fewer, middle = (own.frames for own in found.stages)
+    first, fewer, middle, laser = (own.frames for own in found.stages)
     assert there[first[-1]].sum() >= 25 and np.all(there[first[-1]][:20])
     lengths, free = found.growth["length (nm)"], found.growth["free monomers (uM)"][:, 0]
     total = lengths.sum(axis=1) / 5.0 + free * 2.0 * 602.214
-    for own in (first, fewer, middle):
+    for own in (first, fewer, middle, laser):
         assert total[own] == pytest.approx(total[own[0]], abs=0.1)
     # Within the first report of a stage, some begin anew.
     lost = np.flatnonzero(there[first[-1]] & ~there[fewer[0]])
@@ -126,6 +126,16 @@ def test_grown_filaments_go_with_their_monomers(tmp_path):
     for frame in range(len(found)):
         held = set(found.linkers[frame]["filaments"].ravel().tolist()) - {-1}
         assert held <= set(np.flatnonzero(there[frame]))
+    # Planes cut where filaments go through them.
+    severed = read_reports(found.path / "growth.csv")["filaments severed"][:, 0]
+    crossings = [
+        np.sum(np.diff(own[:, axis] > height))
+        for own in found.nodes(middle[-1])
+        for axis, height in ((0, 0.0), (1, 50.0))
+        if len(own)
+    ]
+    cuts = severed[laser[0]] - severed[middle[-1]]
+    assert 3 <= cuts <= sum(crossings) <= cuts + 3
 
 
 def test_each_has_the_same_chance():
@@ -187,6 +197,9 @@ duration = "0.1 ms"
             "belongs to a later stage",
         ),
         (STAGED + "filament.delete = { number = 3 }", "filament.delete", "unknown key 'number'"),
+        (STAGED + "filament.cut = [{ normal = [1, 0, 0] }]", "filament.cut", "needs filaments that may be cut"),
+        (STAGED + "filament.cut = [3]", "filament.cut", "must be a table, as in { normal = [1, 0, 0] }"),
+        (STAGED + "filament.cut = { normal = [1, 0, 0] }", "filament.cut", "must be a list of tables"),
         (STAGED + "filament.delete = { count = 0 }", "filament.delete", "must be at least 1"),
         (
             STAGED

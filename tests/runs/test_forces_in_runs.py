@@ -45,6 +45,25 @@ seed = 5
 TABLES = ("wall_forces.csv", "contact_forces.csv")
 
 
+def test_sides_of_a_prism_are_faces_of_one_wall(tmp_path):
+    """Each pushes along its normal, inwards."""
+    corners = '[["0 nm", "0 nm"], ["160 nm", "0 nm"], ["0 nm", "150 nm"]]'
+    head, _, tail = BETWEEN_WALLS.partition("[contacts]")
+    head = head.replace('[box]\nedges = ["0.4 um", "0.4 um", "1 um"]\n', "")
+    head += 'inside = { shape = "sphere", center = ["40 nm", "40 nm", "55 nm"], radius = "55 nm" }\n'
+    wall = f'[[wall]]\nshape = "prism"\ncorners = {corners}\nbottom = "0 nm"\ntop = "110 nm"\nstiffness = "0.5 pN/nm"\n'
+    text = head + wall + tail[tail.index("[simulation]") :].replace('"0.2 ms"', '"40 us"')
+    run_with_summary(parse_configuration(text), tmp_path / "out")
+    found = analysis.load(tmp_path / "out").wall_forces
+    assert found["face"][0].tolist() == [0, 1, 2, 3, 4] and not found["wall"].any()
+    loads = found["load (pN)"][1:]
+    forces = np.stack([found[f"force {axis} (pN)"][1:] for axis in "xyz"], axis=-1)
+    normals = np.array([[0, 160, 0], [-150, -160, 0], [150, 0, 0], [0, 0, -1], [0, 0, 1]])
+    normals = normals / np.linalg.norm(normals, axis=1)[:, None]
+    assert loads.min() > 0.0
+    np.testing.assert_allclose(forces, loads[..., None] * normals, atol=1e-6 * loads.max())
+
+
 @pytest.fixture(scope="module")
 def unbroken(tmp_path_factory):
     path = tmp_path_factory.mktemp("forces") / "out"

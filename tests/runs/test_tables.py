@@ -29,6 +29,7 @@ from openmm_cylchain import (
     constant_force,
     constant_tension,
     filament_wall_force,
+    prism_faces,
     stokes_friction,
     theory,
     wall_force,
@@ -110,6 +111,25 @@ def test_walls_are_those_of_python(keys, shape):
     _, system, _ = filaments.build()
     system.addForce(filament_wall_force(filaments, system, shape, 0.1 * PN, 3.5))
     assert_same_system(own, system)
+
+
+PRISM = 'shape = "prism"\ncorners = [["0 um", "0 um"], ["2 um", "0 um"], ["0 um", "2 um"]]\n'
+
+
+def test_a_prism_is_its_faces():
+    own = built(f'[[wall]]\n{PRISM}bottom = "-1 um"\ntop = "1 um"\nstiffness = "0.1 pN/nm"\ndistance = "3.5 nm"\n')
+    filaments = by_hand([filament.positions for filament in own.filaments])
+    _, system, _ = filaments.build()
+    for face in prism_faces([[0, 0], [2000, 0], [0, 2000]], -1000, 1000):
+        system.addForce(filament_wall_force(filaments, system, face, 0.1 * PN, 3.5))
+    assert_same_system(own, system)
+    stiff = 'stiffness = "1 pN/nm"\n'
+    assert_refused("belongs to a prism", f'[[wall]]\nshape = "sphere"\nradius = "2 um"\ntop = "1 um"\n{stiff}')
+    assert_refused("is none of a prism", f'[[wall]]\n{PRISM}radius = "2 um"\n{stiff}')
+    assert_refused("both a bottom and a top", f'[[wall]]\n{PRISM}top = "2 um"\n{stiff}')
+    assert_refused('must be "inside" of a prism', f'[[wall]]\n{PRISM}side = "outside"\n{stiff}')
+    flat = PRISM.replace('["0 um", "2 um"]', '["0 um", "2 um", "1 um"]')
+    assert_refused("must be x and y", f"[[wall]]\n{flat}{stiff}")
 
 
 def assert_refused(message, *tables, **parts):

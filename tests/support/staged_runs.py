@@ -190,5 +190,9 @@ filament.GROWS.delete = { count = 15 }
 name = "middle"
 duration = "5 ms"
 filament.GROWS.delete = { outside = { shape = "sphere", radius = "0.4 um" } }
+[[stage]]
+name = "laser"
+duration = "5 ms"
+filament.GROWS.cut = [{ normal = [1, 0, 0] }, { point = ["0 nm", "50 nm", "0 nm"], normal = [0, 1, 0] }]
 """
-"""Filaments that grow, branch and are cut, of which some go, and then those that are far from the middle."""
+"""Filaments that grow, branch and are cut, of which some go, then those far from the middle; and planes cut others."""

@@ -24,7 +24,7 @@ from ..keys import (
 from ..table import ACTIVE, TableKind, group_of
 from .bodies import check_body_point
 from .filament_types import TypeNames
-from .shapes import SHAPE_KEYS, read_shape, volume_within
+from .shapes import SHAPE_KEYS, read_walls_of, volume_within
 
 CONTACTS = TableKind(
     "contacts",
@@ -235,7 +235,10 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Wall:
-    """A [[wall]] table, whose number is counted from 0; the distance in nm."""
+    """A [[wall]] table, whose number is counted from 0, or a face of the prism that it is; the distance in nm.
+
+    ``first_face`` is the number of its first face among those of the table.
+    """
 
     shape: object
     stiffness: float
@@ -245,6 +248,12 @@ class Wall:
     side: str = "inside"
     nodes: str = "all"
     whole: bool = True
+    first_face: int = 0
+
+    @property
+    def faces(self):
+        """The numbers of its faces among those of the table."""
+        return range(self.first_face, self.first_face + len(self.shape.faces))
 
     @property
     def encloses_all(self):
@@ -320,16 +329,21 @@ def read_contacts(entries, groups):
     return Contacts(*(entries[name] for name in ("diameter", "stiffness", "excluded_neighbors", "relax")))
 
 
-def read_wall(entries):
-    """The Wall of a [[wall]] table."""
-    shape, side = read_shape(entries), entries["side"]
-    if side != "inside" and len(shape.faces) > 1:
+def read_walls(entries):
+    """The Walls of a [[wall]] table: of a prism one for each of its faces."""
+    shapes, side = read_walls_of(entries), entries["side"]
+    if side != "inside" and sum(len(shape.faces) for shape in shapes) > 1:
         raise entries.at("side").error(f'must be "inside" of a {entries["shape"]}, which has several faces.')
-    if side != "outside" and entries["distance"] >= shape.room:
-        raise entries.at("distance").error(f"must be below {shape.room:g} nm to fit into the shape.")
+    room = min(shape.room for shape in shapes)
+    if side != "outside" and entries["distance"] >= room:
+        raise entries.at("distance").error(f"must be below {room:g} nm to fit into the shape.")
     whole = entries["whole"] and side != "surface"
-    names = ("stiffness", "distance", "holds")
-    return Wall(shape, *(entries[name] for name in names), entries.place.path[1], side, entries["nodes"], whole)
+    own = [entries[name] for name in ("stiffness", "distance", "holds")]
+    walls, first_face = [], 0
+    for shape in shapes:
+        walls.append(Wall(shape, *own, entries.place.path[1], side, entries["nodes"], whole, first_face))
+        first_face += len(shape.faces)
+    return walls
 
 
 def walls_of_all(walls):
@@ -350,7 +364,9 @@ def check_walls(tables, walls, groups, bodies, particles):
     ``particles`` are names of [[particles]] tables.
     """
     there = {group.type.name for group in groups} | {group.body.name for group in bodies} | set(particles)
-    for entries, wall in zip(tables, walls):
+    numbered = {entries.place.path[1]: entries for entries in tables}
+    for wall in walls:
+        entries = numbered[wall.number]
         for name in wall.held_types or ():
             if name not in there:
                 raise entries.at("holds").error(

@@ -1,10 +1,11 @@
-"""The ``delete`` of a [[filament]] table in a stage: which filaments go as it begins."""
+"""The ``delete`` and ``cut`` of a [[filament]] table in a stage: which filaments go or are cut as it begins."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..keys import Inline, Key, Whole
+from ...couplings.shapes import Plane
+from ..keys import REQUIRED, Inline, Key, Whole, direction, point
 from ..table import TableKind
 from .shapes import REGION, REGION_EXAMPLE, Region
 
@@ -25,6 +26,16 @@ DELETE = TableKind(
     "Filaments that go, as a stage begins, with their monomers and with what is bound to them; see the page on stages.",
 )
 DELETE_EXAMPLE = "{ count = 5 }"
+
+CUT = TableKind(
+    "cut",
+    (
+        Key("point", point(), (0.0, 0.0, 0.0), "A point on the plane."),
+        Key("normal", direction(), REQUIRED, "Its normal."),
+    ),
+    "A plane that cuts filaments, as a stage begins, wherever they go through it.",
+)
+CUT_EXAMPLE = "{ normal = [1, 0, 0] }"
 
 
 @dataclass(frozen=True)
@@ -59,3 +70,12 @@ def read_deletion(entries):
     entries.only_one("inside", "outside")
     region = entries["inside"] or entries["outside"]
     return Deletion(entries["count"], None if region is None else Region(region), "outside" in entries)
+
+
+def read_cuts(listed):
+    """The Planes of Entries of CUT."""
+    planes = []
+    for entries in listed or ():
+        with entries.naming():
+            planes.append(Plane(np.array(entries["point"]), np.array(entries["normal"])))
+    return tuple(planes)

@@ -14,7 +14,7 @@ from ...units import quantities as units
 from ..keys import Choice, Either, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
 from ..start_files import read_start
 from ..table import ACTIVE, TableKind
-from .deletion import DELETE, DELETE_EXAMPLE, Deletion, read_deletion
+from .deletion import CUT, CUT_EXAMPLE, DELETE, DELETE_EXAMPLE, Deletion, read_cuts, read_deletion
 from .filament_types import MONOMER_LENGTHS, TYPE_KEYS, read_filament_type
 from .growth import GROWTH, GROWTH_EXAMPLE, SEVERING_EXAMPLE, read_growth
 from .shapes import REGION, REGION_EXAMPLE, Region
@@ -134,6 +134,12 @@ FILAMENT = TableKind(
         ),
         ACTIVE,
         Key("delete", Inline(DELETE, DELETE_EXAMPLE), None, "In a `[[stage]]`: filaments that go as it begins."),
+        Key(
+            "cut",
+            Listing(Inline(CUT, CUT_EXAMPLE), "tables", f"[{CUT_EXAMPLE}]"),
+            None,
+            "In a `[[stage]]`: planes that cut filaments as it begins, with growth = { severing_rate = ... }.",
+        ),
         Key("file", Text('"start.npz"'), None, "Start from a file: see below."),
         Key("topology", Text('"topology.cif"'), None, "Topology of a file that is a trajectory."),
         Key("frame", Whole(-(10**12), 10**12, "-1"), None, "Which frame of a trajectory; the last one if not given."),
@@ -187,6 +193,7 @@ class FilamentGroup:
     own_path: tuple = ()
     active: bool = True
     delete: Deletion | None = None
+    cuts: tuple = ()
     nucleation: Nucleation | None = dataclasses.field(default=None, compare=False)
     on_body: bool = False
 
@@ -238,6 +245,11 @@ def read_filaments(entries, table, solvent, box, folder, monomers):
     common = {key: entries[key] for key in ("propulsion", "height", "active")} | {"table": table}
     if entries["delete"] is not None:
         common["delete"] = read_deletion(entries["delete"])
+    common["cuts"] = read_cuts(entries["cut"])
+    if common["cuts"] and (growth is None or growth.severing is None):
+        raise entries.at("cut").error(f"needs filaments that may be cut: give them growth = {SEVERING_EXAMPLE}")
+    if common["cuts"] and box is not None:
+        raise entries.at("cut").error("would not cut the images of filaments in a periodic box: leave [box] out.")
     if growth is not None and not entries["active"]:
         raise entries.at("active").error("is false, but these filaments grow: let them begin by [[nucleation]].")
     if growth is None:

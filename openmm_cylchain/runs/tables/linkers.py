@@ -478,7 +478,9 @@ def _random_anchors(entries, seed, box, walls):
     if wall is None:
         entries.require("lower", "upper")
     elif wall - 1 not in (numbered := {own.number: own for own in walls}):
-        raise entries.at("wall").error(f"is {wall}, but there are {len(walls)} [[wall]] tables.")
+        raise entries.at("wall").error(f"is {wall}, but there are {len(numbered)} [[wall]] tables.")
+    elif numbered[wall - 1].first_face:
+        raise entries.at("wall").error(f"is {wall}, a prism: give their places.")
     if lower is not None and upper is not None and np.any(np.array(lower) > np.array(upper)):
         raise entries.at("upper").error("must not be below lower.")
     if wall is None:

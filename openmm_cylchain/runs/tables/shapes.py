@@ -13,10 +13,11 @@ from ...couplings.shapes import (
     Sphere,
     Torus,
     bounds_of,
+    prism_faces,
     volume_of,
 )
 from ...units import quantities as units
-from ..keys import REQUIRED, Choice, Key, Quantity, direction, point
+from ..keys import REQUIRED, Choice, Key, Listing, Quantity, direction, point
 from ..table import TableKind
 
 _SHAPES = {
@@ -29,6 +30,8 @@ _SHAPES = {
     "box": (Box, ("lower", "upper")),
     "ellipsoid": (Ellipsoid, ("center", "semi_axes")),
 }
+_PRISM = "prism"
+_OF_PRISM = ("corners", "bottom", "top")
 _BOUNDED = ("sphere", "cylinder", "capsule", "torus", "box", "ellipsoid")
 _ORIGIN = (0.0, 0.0, 0.0)
 
@@ -51,7 +54,26 @@ _KEYS = (
     Key("upper", point(), None, "The opposite corner."),
     Key("semi_axes", point(), None, "Semi-axes of an ellipsoid along x, y and z."),
 )
-SHAPE_KEYS = (Key("shape", Choice(tuple(_SHAPES)), REQUIRED, "What filaments are kept in."), *_KEYS)
+_KEYS_OF_PRISM = (
+    Key(
+        "corners",
+        Listing(
+            Listing(Quantity(units.LENGTH, "any"), "two lengths", '["0 um", "0 um"]', 2),
+            "corners",
+            '[["0 um", "0 um"], ["2 um", "0 um"], ["0 um", "2 um"]]',
+            3,
+        ),
+        None,
+        "x and y of the corners of a convex polygon, one after the other: a prism over it has its sides along z.",
+    ),
+    Key("bottom", Quantity(units.LENGTH, "any"), None, "z of the lower end of a prism; without ends if not given."),
+    Key("top", Quantity(units.LENGTH, "any"), None, "z of its upper end."),
+)
+SHAPE_KEYS = (
+    Key("shape", Choice((*_SHAPES, _PRISM)), REQUIRED, "What filaments are kept in."),
+    *_KEYS,
+    *_KEYS_OF_PRISM,
+)
 """Of walls."""
 
 REGION = TableKind(
@@ -70,6 +92,20 @@ REGION = TableKind(
     "A region in which filaments or particles begin, or linkers diffuse.",
 )
 REGION_EXAMPLE = '{ shape = "sphere", radius = "1 um" }'
+
+
+def read_walls_of(entries):
+    """The Shapes of a table with SHAPE_KEYS: one, or the faces of a prism."""
+    if entries["shape"] != _PRISM:
+        entries.refuse(_OF_PRISM, "belongs to a prism.")
+        return (read_shape(entries),)
+    entries.refuse(sorted(key.name for key in _KEYS), f"is none of a prism: that has {', '.join(_OF_PRISM)}.")
+    entries.require("corners")
+    for place, corner in enumerate(entries["corners"]):
+        if len(corner) != 2:
+            raise entries.at("corners").item(place).error("must be x and y of a corner.")
+    with entries.naming():
+        return prism_faces(entries["corners"], entries["bottom"], entries["top"])
 
 
 def read_shape(entries, others=()):

@@ -34,7 +34,7 @@ CHANGES = {
     ),
     "filament": (
         *("persistence_length", "bending_rigidity", "stretching_modulus", "stretching_stiffness", "propulsion"),
-        *("growth", "active", "delete"),
+        *("growth", "active", "delete", "cut"),
     ),
     "monomers": ("plus_on_rate", "plus_off_rate", "minus_on_rate", "minus_off_rate", "aging", "concentration"),
     "nucleation": ("rate", "total_rate", "direction", "inside"),
@@ -64,6 +64,9 @@ CHANGES = {
             "lower",
             "upper",
             "semi_axes",
+            "corners",
+            "bottom",
+            "top",
             "stiffness",
         ),
         *("length", "distance", "side", "whole", "nodes", "holds", "active"),

@@ -416,6 +416,14 @@ void CylinderChainGrowthForce::setGrowthInContext(Context& context, const vector
     dynamic_cast<CylinderChainGrowthForceImpl&>(getImplInContext(context)).setEnds(ends);
 }
 
+int CylinderChainGrowthForce::cutInContext(Context& context, const Vec3& point, const Vec3& vector,
+        const std::vector<int>& numbers) const {
+    for (int index : numbers)
+        getOwn(index);
+    return dynamic_cast<CylinderChainGrowthForceImpl&>(getImplInContext(context)).cut({{point[0], point[1], point[2]},
+            {vector[0], vector[1], vector[2]}, numbers});
+}
+
 ForceImpl* CylinderChainGrowthForce::createImpl() const {
     return new CylinderChainGrowthForceImpl(*this);
 }

@@ -208,10 +208,27 @@ void CylinderChainGrowthForceImpl::updateContextState(ContextImpl& context, bool
     const double size = context.getIntegrator().getStepSize();
     if (!(size > 0))
         return;
-    const CylinderChainIntegrator& integrator = dynamic_cast<const CylinderChainIntegrator&>(context.getIntegrator());
-    GrowthStep step = {BOLTZ*integrator.getTemperature(), size, seed};
+    GrowthStep step = {getThermalEnergy(), size, seed};
     for (CouplingForceImpl* coupling : couplings)
         coupling->findSeveringHands(step.severingHands);
+    forcesInvalid |= !grow(step).chains.empty();
+}
+
+int CylinderChainGrowthForceImpl::cut(const CuttingPlane& plane) {
+    follow();
+    findCouplings();
+    refusePlaces();
+    GrowthStep step = {getThermalEnergy(), 0, seed};
+    step.plane = &plane;
+    return grow(step).crossings;
+}
+
+double CylinderChainGrowthForceImpl::getThermalEnergy() const {
+    return BOLTZ*dynamic_cast<const CylinderChainIntegrator&>(context->getIntegrator()).getTemperature();
+}
+
+/** Let chains grow in a step, and tell all that needs to know: what has changed. */
+GrowthChanges CylinderChainGrowthForceImpl::grow(const GrowthStep& step) {
     vector<Surroundings*> felt;
     felt.reserve(around.size());
     for (const Felt& own : around)
@@ -223,7 +240,7 @@ void CylinderChainGrowthForceImpl::updateContextState(ContextImpl& context, bool
         numNodes.push_back(list.getNumNodes(chain));
     GrowthChanges changes;
     try {
-        changes = kernel.getAs<UpdateCylinderChainGrowthKernel>().execute(context, state, step,
+        changes = kernel.getAs<UpdateCylinderChainGrowthKernel>().execute(*context, state, step,
                 chains->getDescription().usesPeriodicBoundaryConditions(), list, felt);
     }
     catch (const invalid_argument& error) {
@@ -234,19 +251,19 @@ void CylinderChainGrowthForceImpl::updateContextState(ContextImpl& context, bool
             "them those of chain "+to_string(changes.failed == -1 ? -1 : growing[changes.failed])+": use a smaller "
             "step, or look at the rates");
     if (changes.chains.empty())
-        return;
+        return changes;
     vector<int> numbers(changes.chains);
     for (int& number : numbers)
         number = growing[number];
-    chains->haveGrown(context, numbers);
+    chains->haveGrown(*context, numbers);
     for (CouplingForceImpl* coupling : couplings)
-        coupling->chainsHaveGrown(context, list, changes);
+        coupling->chainsHaveGrown(*context, list, changes);
     const bool otherNodes = any_of(changes.chains.begin(), changes.chains.end(), [&] (int i) {
         return list.getNumNodes(growing[i]) != numNodes[i];
     });
     if (otherNodes)
         setSpareNodes(numbers);
-    forcesInvalid = true;
+    return changes;
 }
 
 double CylinderChainGrowthForceImpl::calcForcesAndEnergy(ContextImpl& context, bool, bool, int) {

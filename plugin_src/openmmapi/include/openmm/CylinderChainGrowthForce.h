@@ -244,6 +244,17 @@ public:
      */
     void setGrowthInContext(Context& context, const std::vector<int>& ends) const;
     /**
+     * Cut chains of a Context at once, wherever they go through a plane.  Both parts are chains then, see
+     * setSevering(): where there is none for a part, or a part has too few monomers, a chain is not cut.
+     *
+     * @param context  a Context of a System that holds this Force
+     * @param point    a point on the plane, measured in nm
+     * @param vector   its normal
+     * @param numbers  the indices of the chains among those that grow
+     * @return at how many places they go through the plane
+     */
+    int cutInContext(Context& context, const Vec3& point, const Vec3& vector, const std::vector<int>& numbers) const;
+    /**
      * Get what grows.
      */
     const cylchain::GrowthSystem& getSystem() const {

@@ -47,6 +47,10 @@ public:
      */
     void setEnds(const std::vector<int>& ends);
     /**
+     * Cut chains by a plane, see CylinderChainGrowthForce::cutInContext().
+     */
+    int cut(const cylchain::CuttingPlane& plane);
+    /**
      * Throw an exception if something else than what growth knows acts on nodes of chains that grow.
      *
      * @param forces  on all particles, but those of chains and of couplings that the step has in its equations
@@ -60,6 +64,8 @@ public:
 private:
     void follow() const;
     void accept();
+    double getThermalEnergy() const;
+    cylchain::GrowthChanges grow(const cylchain::GrowthStep& step);
     void setState(const cylchain::GrowthState& replaced);
     void findCouplings();
     void refusePlaces();
