@@ -1,6 +1,7 @@
 """Rings that are wound until they supercoil: writhe, torque and size beside Monte Carlo, also between walls and linked.
 
-Energies are those of ``support.supercoil_monte_carlo``, which knows nothing of the package; so are references.
+Energies are those of ``support.supercoil_monte_carlo``, which knows nothing of the package; so are references, of which
+an exhaustive test computes one again.
 """
 
 from dataclasses import replace
@@ -136,3 +137,14 @@ def test_supercoils_are_those_of_monte_carlo(ring, step, time):
     allowed = np.array([0.05, 0.05, 0.15, 0.04, 0.1, 0.05]) * exact
     assert (np.abs(means - exact) <= allowed + 4 * errors).all(), lines
     assert (4 * errors <= np.array([0.12, 0.15, 0.2, 0.06, 0.2, 0.2]) * exact).all(), lines
+
+
+@pytest.mark.exhaustive
+def test_reference_is_that_of_monte_carlo():
+    """Within what minutes can see."""
+    sampler = SupercoilMonteCarlo(RING, regular_rings(RING, 64), 11, winding=1500)
+    sampler.sweep(3000)
+    means, errors = sampler.means(60, 50)
+    exact, exact_errors = np.array(REFERENCES[RING])
+    assert (np.abs(means - exact) <= 4 * np.hypot(errors, exact_errors)).all()
+    assert (4 * errors[:4] <= np.array([0.05, 0.15, 0.4, 0.06]) * exact[:4]).all()

@@ -102,3 +102,11 @@ class SupercoilMonteCarlo(RingMonteCarlo):
 
     def _twist_energies(self, writhes):
         return 0.5 * self.ring.twist / self.ring.segments * (2.0 * np.pi * (self._turns - writhes)) ** 2
+
+    def means(self, samples, interval):
+        """Means and standard errors (6,) of ``SupercoiledRing.observe``, of copies that are equal."""
+        total = 0.0
+        for _ in range(samples):
+            self.sweep(interval)
+            total = total + self.ring.observe(self.nodes) / samples
+        return total.mean(axis=0), total.std(axis=0, ddof=1) / np.sqrt(len(total))
