@@ -40,7 +40,7 @@ _COUPLES = {
 class Linked:
     """What is created of one single or couple: how many, how many of them bound, points of anchors, and places.
 
-    ``places`` are the places on filaments of those whose first hands begin there.
+    ``places`` are the places on filaments of those whose first hands begin there, or both.
     """
 
     count: int = 0
@@ -54,10 +54,15 @@ class Linked:
         """How many begin at places."""
         return sum(len(own["filament"]) for own in self.places)
 
-    def hold(self, site, count):
-        """A count of them begin at a site, unless it is None."""
-        if site is not None:
-            self.places.append({**site["at"], "filament": [site["made"].number] * count})
+    def hold(self, site, count, second=None):
+        """A count of them begin at a site, unless it is None, with the second hands at another one."""
+        if site is None:
+            return
+        place = {**site["at"], "filament": [site["made"].number] * count}
+        if second is not None:
+            place["second_filament"] = [second["made"].number] * count
+            place["second_arc_length"] = second["at"]["arc_length"]
+        self.places.append(place)
 
 
 def add_linkers(translation, news):
@@ -102,7 +107,7 @@ def _couples(translation, own, new, linked):
     options = new.settings
     for key in ("position", "orientation", "direction", "placement", "range"):
         options.values(key)
-    keys = [key for key in ("attach1", "attach2", "site1", "site2") if key in options]
+    keys = [key for key in ("attach1", "site1", "attach2", "site2") if key in options]
     if len(keys) < 2:
         for key in keys:
             site = _site(translation, options, key)
@@ -116,12 +121,17 @@ def _couples(translation, own, new, linked):
         return
     hands = _hands_of(translation, own)
     places = [_site(translation, options, key) for key in keys]
-    if None in places or not all(hand.stays for hand in hands) or own.settings.text("activity") in _COUPLES:
+    if None in places or own.settings.text("activity") in _COUPLES:
         translation.left_out(f"where {count} {new.name} are attached", new.line, PLACED)
         linked.count += count
         linked.bound += count
-    elif any(place["made"].grows for place in places):
-        translation.left_out(f"{count} {new.name} that join for ever", new.line, GROWING)
+    elif not all(hand.stays for hand in hands) or any(place["made"].grows for place in places):
+        linked.count += count
+        second = places[1]
+        if places[0]["made"].number == second["made"].number or any("site_spacing" in hand.table for hand in hands):
+            translation.left_out(f"where second hands of {count} {new.name} are", new.line, PLACED)
+            second = None
+        linked.hold(places[0], count, second)
     else:
         for _ in range(count):
             _link(translation, own, new, *map(_joined, places))
@@ -417,7 +427,7 @@ def _add_bound(table, own, linked, hand):
             table.comment(Note(LEFT_OUT, "where they begin bound: to sites, at random here", own.line, PLACED))
             table.add("bound", linked.held)
         else:
-            table.add("bound_at", linked.places, Note(EXACT, "where their first hands are attached"))
+            table.add("bound_at", linked.places, Note(EXACT, "where hands are attached"))
     elif linked.bound:
         bound = min(linked.bound, linked.count)
         table.add("bound", bound, Note(NEAREST, "attach1: one hand is bound, at random"))

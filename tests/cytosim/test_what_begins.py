@@ -105,6 +105,27 @@ def test_hands_begin_where_they_are_attached(tmp_path):
     assert table.filaments[8:, 1].tolist() == [0, -1, -1]
 
 
+@pytest.mark.parametrize(
+    ("unbinding", "growth"),
+    [("0.1, 3", ""), ("0, inf", "; activity = grow; growing_speed = 0.1; growing_force = inf")],
+)
+def test_couples_begin_where_both_hands_are_attached(unbinding, growth, tmp_path):
+    """Those that let go, and those that join filaments that grow for ever."""
+    text = TUBE.replace(" }", growth + " }") + f"set hand glue {{ binding = 10, 0.05; unbinding = {unbinding} }}\n"
+    text += "set couple joint { hand1 = glue; hand2 = glue; stiffness = 100; diffusion = 1 }\n"
+    text += f"new 2 tube {{ length = 2{'; plus_end = grow' if growth else ''} }}\n"
+    text += "new joint { attach1 = tube1, 0.2; attach2 = tube2, 0.5 }\n"
+    found, document = translated(tmp_path, text)
+    assert document.missing == []
+    (couples,) = found.linkers
+    assert couples.bound_at == (((0, 200.0), (1, 500.0)),)
+    simulation, built = create_simulation(found)
+    begin(found, simulation, built)
+    table = built.filaments.in_context(simulation.context).linkers()
+    assert table.filaments[0].tolist() == [0, 1]
+    np.testing.assert_allclose(table.arc_lengths[0], [200.0, 500.0])
+
+
 NUCLEATOR = """set hand maker { unbinding = 0, 3; activity = nucleate;
  nucleate = 40, tube, ( length = 0.2; plus_end = grow ) }
 set single seed { hand = maker; activity = fixed; stiffness = 1000 }
