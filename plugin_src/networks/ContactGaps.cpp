@@ -122,9 +122,6 @@ void ContactGaps::begin(const CoupledStart& start, const Loop& newLoop) {
  * @return the number of contacts
  */
 int ContactGaps::findContactsBeside(const ContactPair& pair, ContactPair& last, Contact* contacts) const {
-    auto around = [&] (int capsule) {
-        return array<int, 3> {capsule, search->getNeighbor(capsule, false), search->getNeighbor(capsule, true)};
-    };
     int result = 0;
     double deepest = 0;
     for (int a : around(pair.a))
@@ -189,7 +186,7 @@ void ContactGaps::follow(NearPair& own, bool again) const {
     }
     int count = search->evaluate(pair, contacts);
     // What touches a neighbor at the start and at the end is no gap of this pair.
-    own.gap.present = count > 0 || own.touchedAtStart;
+    own.gap.present = (count > 0 || own.touchedAtStart) && !(again && own.ofNeighbor);
     ContactPair last = pair;
     if (count == 0 && own.touchedAtStart)
         count = findContactsBeside(pair, last, contacts);
@@ -230,20 +227,38 @@ double ContactGaps::findEnd(const NearPair& own) const {
     return sum;
 }
 
+/** A capsule and its neighbors, or -1. */
+array<int, 3> ContactGaps::around(int capsule) const {
+    return {capsule, search->getNeighbor(capsule, false), search->getNeighbor(capsule, true)};
+}
+
 /**
- * Get whether a contact may come from a neighbor that is held in by the spring of the surface: a hard one must not keep
- * it out in the same step.
+ * Find pairs whose contacts may become those of their neighbors: the spring of the surface holds them in, or they have
+ * gone on. Hard surfaces of the neighbors must not keep them out in the same step.
  */
-bool ContactGaps::isOfNeighbor(const NearPair& own, const vector<const NearPair*>& deep) const {
-    const vector<Capsule>& capsules = search->getSystem().capsules;
-    auto areNeighbors = [&] (int a, int b) {
-        return a == b || capsules[a].first == capsules[b].second || capsules[a].second == capsules[b].first;
-    };
+void ContactGaps::findGoing() {
+    going.clear();
+    for (const NearPair& own : near) {
+        const ContactPair& pair = candidates.get(own.pair);
+        const bool hasGoneOn = own.last[0] != pair.a || own.last[1] != pair.b;
+        if (!own.touchedAtStart || (own.gap.law != GapLaw::Spring && !hasGoneOn))
+            continue;
+        going.push_back({pair.a, pair.b});
+        going.push_back({pair.b, pair.a});
+    }
+    sort(going.begin(), going.end());
+}
+
+/** Get whether the contact of a pair that had none may be that of a neighbor. */
+bool ContactGaps::isOfNeighbor(const NearPair& own) const {
+    if (own.touchedAtStart)
+        return false;
     const ContactPair& pair = candidates.get(own.pair);
-    return !own.touchedAtStart && any_of(deep.begin(), deep.end(), [&] (const NearPair* other) {
-        const ContactPair& deeper = candidates.get(other->pair);
-        return areNeighbors(pair.a, deeper.a) && areNeighbors(pair.b, deeper.b);
-    });
+    for (int a : around(pair.a))
+        for (int b : around(pair.b))
+            if (binary_search(going.begin(), going.end(), make_pair(a, b)))
+                return true;
+    return false;
 }
 
 bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, ReflectedGaps& gaps) {
@@ -264,14 +279,16 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
         else
             gaps.get(near[i].number).end = near[i].gap.end;
     });
-    vector<const NearPair*> deep;
-    for (const NearPair& own : near)
-        if (own.touchedAtStart && (own.gap.law == GapLaw::Spring || own.hasGoneOn(candidates.get(own.pair))))
-            deep.push_back(&own);
-    for (NearPair& own : near)
-        if (own.number < 0 && own.hasMoved && own.gap.numLevers > 0 && own.gap.present && mayClose(own.gap) &&
-                !isOfNeighbor(own, deep))
+    findGoing();
+    for (NearPair& own : near) {
+        if (!own.hasMoved)
+            continue;
+        own.ofNeighbor = isOfNeighbor(own);
+        if (own.number >= 0 && own.ofNeighbor)
+            gaps.get(own.number).present = own.gap.present = false;
+        else if (own.number < 0 && own.gap.numLevers > 0 && own.gap.present && mayClose(own.gap) && !own.ofNeighbor)
             own.number = gaps.add(own.gap);
+    }
     return candidates.mayLackPairs() && !settled;
 }
 

@@ -7,7 +7,7 @@
 #include "networks/ContactEquations.h"
 #include "networks/ImplicitCouplings.h"
 #include "networks/PlaceResponses.h"
-#include <cstddef>
+#include <array>
 #include <utility>
 #include <vector>
 
@@ -77,17 +77,17 @@ private:
         double fractions[4][2] = {}, offset = 0;
         /** How often it has been found again when all had converged. */
         int timesAgain = 0;
-        /** Whether the contact that its pair had is that of segments beside it in the end. */
-        bool hasGoneOn(const ContactPair& own) const {
-            return last[0] != own.a || last[1] != own.b;
-        }
+        /** Whether its contact may be that of a neighbor. */
+        bool ofNeighbor = false;
     };
     static PairGap findPairGap(const SegmentPair& pair, const Contact* contacts, int count, double radii);
     void follow(NearPair& near, bool again = false) const;
     int findContactsBeside(const ContactPair& pair, ContactPair& last, Contact* contacts) const;
     ContactPair pairOfLever(const NearPair& near, int lever) const;
     bool mayClose(const Gap& gap) const;
-    bool isOfNeighbor(const NearPair& own, const std::vector<const NearPair*>& deep) const;
+    std::array<int, 3> around(int capsule) const;
+    void findGoing();
+    bool isOfNeighbor(const NearPair& own) const;
     double findEnd(const NearPair& near) const;
     /** Those of steps that do not resolve contacts. */
     ContactEquations hard;
@@ -106,6 +106,8 @@ private:
     std::vector<double> responsesOfCapsules;
     CandidatePairs candidates;
     std::vector<NearPair> near;
+    /** The capsules of pairs whose contacts go on, either way round, in order. */
+    std::vector<std::pair<int, int> > going;
 };
 
 } // namespace cylchain
