@@ -38,6 +38,7 @@ CASES = [
     ("turnover_bundle", "turnover", 60, 60, (48 + 96) * 20, (48 + 96) * 19),
     ("microtubule_search", "search", 60, 60, 250 * 32, 250 * 31),
     ("branched_network", "branched", 60, 60, (20 + 120) * 8, (20 + 120) * 7),
+    ("motile_bead", "motile", 60, 60, (30 + 500) * 8 + 3, (30 + 500) * 7),
     ("aster_in_a_cell", "aster", 60, 60, 2120, 1536),
     ("microrheology", "microrheology", 60, 60, 2179, 120 * 16),
     ("force_extension", "dna", 200, 100, 24 * 21, 24 * 20),

@@ -15,7 +15,7 @@ const double NARROWER[] = {1, 0.6, 0.35, 0.2};
 /** The largest depth of a hard surface, over the sum of the radii: it is before the axes. */
 const double LARGEST_DEPTH = 0.95;
 /** Pairs that a thread looks at together. */
-const int CHUNK_OF_PAIRS = 256;
+const int CHUNK_OF_CANDIDATES = 256;
 
 } // namespace
 
@@ -175,13 +175,13 @@ void CandidatePairs::drawSurfaces(int first, int last) {
 
 /** Find the pairs from a number on, or those that have travelled far enough, whose gaps may be closed. */
 void CandidatePairs::select(int firstNew) {
-    const int count = pairs.size(), chunks = (count+CHUNK_OF_PAIRS-1)/CHUNK_OF_PAIRS;
+    const int count = pairs.size(), chunks = (count+CHUNK_OF_CANDIDATES-1)/CHUNK_OF_CANDIDATES;
     rooms.resize(count, 0.0);
     surfaces.resize(count);
     parts.resize(max(parts.size(), (size_t) chunks));
     (*loop)(chunks, [&] (int chunk) {
         Looks& looks = Looks::ofThread();
-        const int first = chunk*CHUNK_OF_PAIRS, last = min(count, first+CHUNK_OF_PAIRS);
+        const int first = chunk*CHUNK_OF_CANDIDATES, last = min(count, first+CHUNK_OF_CANDIDATES);
         drawSurfaces(max(first, firstNew), last);
         for (int i = first; i < last; i++) {
             const ContactPair& pair = get(i);
@@ -226,10 +226,10 @@ const vector<int>& CandidatePairs::getCrossed() {
     crossedAreKnown = true;
     if (tooFar)
         return crossed;
-    const int count = pairs.size(), chunks = (count+CHUNK_OF_PAIRS-1)/CHUNK_OF_PAIRS;
+    const int count = pairs.size(), chunks = (count+CHUNK_OF_CANDIDATES-1)/CHUNK_OF_CANDIDATES;
     (*loop)(chunks, [&] (int chunk) {
         Looks& looks = Looks::ofThread();
-        for (int i = chunk*CHUNK_OF_PAIRS; i < min(count, (chunk+1)*CHUNK_OF_PAIRS); i++)
+        for (int i = chunk*CHUNK_OF_CANDIDATES; i < min(count, (chunk+1)*CHUNK_OF_CANDIDATES); i++)
             if (!places->areHeld(get(i)) && !(getWay(i) < get(i).clearance))
                 looks.add(i, get(i));
         looks.look(*search);

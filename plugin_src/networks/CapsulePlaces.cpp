@@ -7,7 +7,7 @@ using namespace std;
 namespace {
 
 /** Capsules that a thread looks at together. */
-const int CHUNK_OF_CAPSULES = 256;
+const int CHUNK_OF_CAPSULE_PLACES = 256;
 
 } // namespace
 
@@ -20,7 +20,7 @@ void CapsulePlaces::begin(const CoupledStart& start, const vector<Capsule>& caps
         found = PlaceOnChain();
         return false;
     };
-    runInChunks(loop, capsules.size(), CHUNK_OF_CAPSULES, [&] (int i) {
+    runInChunks(loop, capsules.size(), CHUNK_OF_CAPSULE_PLACES, [&] (int i) {
         Place place;
         place.first = capsules[i].first;
         place.second = capsules[i].second;

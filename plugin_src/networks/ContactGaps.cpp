@@ -17,8 +17,8 @@ const int MOVING_ITERATIONS = 3;
 /** How often a gap is found again when all has converged, and from which thermal change of it on. */
 const int MOST_TIMES_AGAIN = 4;
 const double LARGEST_CHANGE = 1;
-/** Capsules, or gaps, that a thread looks at together. */
-const int CHUNK_OF_CAPSULES = 256;
+/** Capsules, or pairs of them, that a thread looks at together. */
+const int CHUNK_OF_CONTACT_GAPS = 256;
 
 Vec3d gradientOf(const Contact& contact) {
     return {contact.normal[0], contact.normal[1], contact.normal[2]};
@@ -104,7 +104,7 @@ void ContactGaps::begin(const CoupledStart& start, const Loop& newLoop) {
     const vector<Capsule>& capsules = search->getSystem().capsules;
     places.begin(start, capsules, *onCurves, newLoop);
     responsesOfCapsules.resize(capsules.size());
-    runInChunks(*loop, capsules.size(), CHUNK_OF_CAPSULES, [&] (int i) {
+    runInChunks(*loop, capsules.size(), CHUNK_OF_CONTACT_GAPS, [&] (int i) {
         double& largest = responsesOfCapsules[i] = 0;
         for (double fraction : {0, 1})
             if (!places.isHeld(i))
@@ -270,7 +270,7 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
         near.emplace_back();
         near.back().pair = pair;
     }
-    runInChunks(*loop, near.size(), CHUNK_OF_CAPSULES, [&] (int i) {
+    runInChunks(*loop, near.size(), CHUNK_OF_CONTACT_GAPS, [&] (int i) {
         follow(near[i]);
         if (near[i].number < 0)
             return;
@@ -295,7 +295,7 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
 bool ContactGaps::followAgain(ReflectedGaps& gaps) {
     const vector<int>& crossed = candidates.getCrossed();
     const double largest = LARGEST_CHANGE*sqrt(kT/stiffness);
-    runInChunks(*loop, near.size(), CHUNK_OF_CAPSULES, [&] (int i) {
+    runInChunks(*loop, near.size(), CHUNK_OF_CONTACT_GAPS, [&] (int i) {
         NearPair& own = near[i];
         own.hasMoved = false;
         if (own.number < 0 || own.timesAgain == MOST_TIMES_AGAIN)
