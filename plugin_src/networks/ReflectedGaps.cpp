@@ -392,9 +392,14 @@ bool ReflectedGaps::isTorn(int i) const {
     return -forces[i]*responses.getOwn(i) > LARGEST_PULL*(fabs(free[i]-gap.ceiling)+sqrt(kT*responses.getOwn(i)));
 }
 
+/** Whether a gap ends behind the surface that reflects it, to which forces without bound may have led it. */
+bool ReflectedGaps::isBehind(int i) const {
+    return gaps[i].present && gaps[i].law == GapLaw::Reflection && gaps[i].end < -scaleOf(i)-LEAST_CHANGE_OF_GAPS;
+}
+
 void ReflectedGaps::findFailures(vector<bool>& failed) const {
     for (size_t i = 0; i < gaps.size(); i++)
-        for (int side = 0; side < 2 && (isUnfinished(i) || isTorn(i)); side++)
+        for (int side = 0; side < 2 && (isUnfinished(i) || isTorn(i) || isBehind(i)); side++)
             if (gaps[i].packOf(side) >= 0)
                 failed[gaps[i].chainOf(side)] = true;
 }

@@ -80,6 +80,7 @@ private:
     double scaleOf(int gap) const;
     bool wouldPush(const Gap& gap) const;
     bool isTorn(int gap) const;
+    bool isBehind(int gap) const;
     bool deviates(int gap, double share) const;
     std::vector<Gap> gaps;
     GapNoise noise;
