@@ -355,8 +355,16 @@ bool ReflectedGaps::wouldPush(const Gap& gap) const {
     return gap.end < 0 || gap.start*gap.end < LARGE_REFLECTION*kT*gap.response;
 }
 
+/**
+ * Whether a gap ends behind the surface that reflects it: forces without bound have led it there, or it has become one
+ * after forces were found.
+ */
+bool ReflectedGaps::isBehind(int i) const {
+    return gaps[i].present && gaps[i].law == GapLaw::Reflection && gaps[i].end < -scaleOf(i)-LEAST_CHANGE_OF_GAPS;
+}
+
 bool ReflectedGaps::isUnfinished(int i) const {
-    return deviates(i, OF_ITERATIONS);
+    return deviates(i, OF_ITERATIONS) || isBehind(i);
 }
 
 /** Whether a gap is farther from where the equations have led it than a share of its thermal scale. */
@@ -392,14 +400,9 @@ bool ReflectedGaps::isTorn(int i) const {
     return -forces[i]*responses.getOwn(i) > LARGEST_PULL*(fabs(free[i]-gap.ceiling)+sqrt(kT*responses.getOwn(i)));
 }
 
-/** Whether a gap ends behind the surface that reflects it, to which forces without bound may have led it. */
-bool ReflectedGaps::isBehind(int i) const {
-    return gaps[i].present && gaps[i].law == GapLaw::Reflection && gaps[i].end < -scaleOf(i)-LEAST_CHANGE_OF_GAPS;
-}
-
 void ReflectedGaps::findFailures(vector<bool>& failed) const {
     for (size_t i = 0; i < gaps.size(); i++)
-        for (int side = 0; side < 2 && (isUnfinished(i) || isTorn(i) || isBehind(i)); side++)
+        for (int side = 0; side < 2 && (isUnfinished(i) || isTorn(i)); side++)
             if (gaps[i].packOf(side) >= 0)
                 failed[gaps[i].chainOf(side)] = true;
 }
