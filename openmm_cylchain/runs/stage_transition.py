@@ -10,7 +10,7 @@ import numpy as np
 
 from ..systems.carried_state import carry_state
 from .created_simulation import stage_simulation
-from .deleted_filaments import cut_filaments, deleted_filaments
+from .deleted_and_cut_filaments import cut_filaments, deleted_filaments
 from .relaxation import relaxed_again
 from .tables.linkers import KEPT
 

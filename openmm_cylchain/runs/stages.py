@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InputError, InstabilityError
 from ..units.quantities import TIME
 from ..units.text import format_time
-from .deleted_filaments import refuse_held
+from .deleted_and_cut_filaments import refuse_held
 from .keys import ConfigurationError, Place, Quantity
 from .stage_changes import apply_stage, in_unit_of
 from .table import UnknownKeyError

@@ -209,10 +209,12 @@ def _draw_forces(axes, configuration, directory, times):
         table = read_reports(directory.wall_forces)
         time, loads = table["time (ms)"][1:, 0] * MILLISECOND / length, table["load (pN)"][1:]
         walls = {(own.number, face): own for own in configuration.walls for face in own.faces}
+        # What has more than one Wall is a prism.
+        prisms = {own.number for own in configuration.walls if own.first_face}
         faces = zip(table["wall"][0].astype(int), table["face"][0].astype(int))
         for number, (wall, face) in enumerate(faces):
-            of_prism = any(own == wall and first for (own, _), first in walls.items() if first.first_face)
-            label = f"wall {wall}, prism, face {face}" if of_prism else _face_label(walls[wall, face], wall, face)
+            prism = f"wall {wall}, prism, face {face}"
+            label = prism if wall in prisms else _face_label(walls[wall, face], wall, face)
             axes[0].plot(time, loads[:, number], color=_COLOURS[number % len(_COLOURS)], linewidth=1.2, label=label)
     if configuration.contacts_of_filaments:
         table = read_reports(directory.contact_forces)

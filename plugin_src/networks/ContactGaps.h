@@ -18,9 +18,9 @@ namespace cylchain {
  *
  * A pair has one gap for its energy at the start and at the end, each with the contacts that it has then: so a step
  * back has the same gaps. Half of the force acts where they are nearest at the start, half where they are at the end.
- * One that its spring holds in goes on with the contact to the next segment. After a few iterations the places of a gap
- * stay. Where all has converged, gaps that are others by now are found again, and segments that still have crossed
- * fail.
+ * Where the contact goes on to the next segment within the step, so does its gap: with the spring or the hard surface
+ * that it has, and in place of one of the pair there. After a few iterations the places of a gap stay. Where all has
+ * converged, gaps that are others by now are found again, and segments that still have crossed fail.
  */
 class ContactGaps : public ImplicitCouplings {
 public:

@@ -267,29 +267,26 @@ def benchmark_dna(effort=FULL, say=lambda message: None):
     nodes = plasmid.context.getState(positions=True).getPositions(asNumpy=True)._value
     writhe = analysis.writhe(nodes[plasmid.filaments.node_indices[0]])
     say(f"a chain of {effort.chain} segments")
-    chains = {
-        name: create_chain(effort.chain, effort.extruders, contacts)
-        for name, contacts in (("chain", True), ("chain_without_contacts", False))
-    }
+    chain, without_contacts = (create_chain(effort.chain, effort.extruders, contacts) for contacts in (True, False))
     beads = BeadsOfPolychrom(effort.chain, effort.extruders)
     recommended = {
         name: float(own.filaments.recommended_time_step(system=own.context.getSystem()).step)
-        for name, own in (("plasmid", plasmid), ("chain", chains["chain"]))
+        for name, own in (("plasmid", plasmid), ("chain", chain))
     }
-    chains["chain"].context.getIntegrator().setStepSize(recommended["chain"])
-    for own in (*chains.values(), beads):
+    chain.context.getIntegrator().setStepSize(recommended["chain"])
+    for own in (chain, without_contacts, beads):
         own.advance(_CHAIN_SETTLING)
-    lengths = {
-        "plasmid": recommended["plasmid"],
-        "plasmid_10_ns": _SETTLING_STEP,
-        "chain": recommended["chain"],
-        **{f"chain_without_contacts_{step:g}_us": step * _MICROSECOND for step in effort.steps},
+    measured = {
+        "plasmid": (plasmid, recommended["plasmid"]),
+        "plasmid_10_ns": (plasmid, _SETTLING_STEP),
+        "chain": (chain, recommended["chain"]),
     }
-    networks = {"plasmid": plasmid, **chains}
-    cases = [_case(name, networks[name.partition("_1")[0]], step) for name, step in lengths.items()]
+    for step in effort.steps:
+        measured[f"chain_without_contacts_{step:g}_us"] = without_contacts, step * _MICROSECOND
+    cases = [_case(name, network, step) for name, (network, step) in measured.items()]
     cases += [Case("polychrom", beads.advance), Case("moves", beads.move)]
     times = time_interleaved(cases, effort.repetitions, effort.seconds, say, clock=time.process_time)
-    rows = speed_rows(lengths, times)
+    rows = speed_rows({name: step for name, (_, step) in measured.items()}, times)
     rows += [Row(f"recommended_step_{name}", step / _MICROSECOND, None, "us") for name, step in recommended.items()]
     rows += [Row("missing_turns_plasmid", -turns, None, "1"), Row("writhe_plasmid", writhe, None, "1")]
     settings = {
