@@ -71,6 +71,7 @@ from .wormlike_chain import (
     bending_mode_variance,
     clamped_angle_variance,
     clamped_deflection_variance,
+    wlc_j_factor,
     wlc_mean_square_end_to_end,
     wlc_tangent_correlation,
 )
@@ -127,6 +128,7 @@ __all__ = [
     "stretching_energy_mean",
     "stretching_energy_variance",
     "twisted_chain",
+    "wlc_j_factor",
     "wlc_mean_square_end_to_end",
     "wlc_relative_extension",
     "wlc_share_of_force",
