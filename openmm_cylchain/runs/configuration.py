@@ -28,15 +28,12 @@ from .tables.couplings import (
     LINK,
     PULL,
     TETHER,
-    WALL,
     Contacts,
-    check_walls,
     read_contacts,
     read_end_frame,
     read_link,
     read_pull,
     read_tether,
-    read_walls,
 )
 from .tables.filament import FILAMENT, MOST_NODES, read_filaments, read_reserve
 from .tables.filament_types import PRESETS as PRESETS
@@ -49,6 +46,7 @@ from .tables.particles import PARTICLES, read_particles
 from .tables.simulation import SIMULATION, SimulationSettings, read_seed, read_simulation
 from .tables.solvent import BOX, FLOW, SOLVENT, Solvent, read_flow, read_solvent
 from .tables.stages import STAGE
+from .tables.walls import WALL, check_walls, read_walls
 from .toml_lines import lines_of, read_toml
 
 TABLES = (

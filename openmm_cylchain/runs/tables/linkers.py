@@ -17,11 +17,12 @@ from ...kinetics.presets import PRESETS
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Flag, Inline, Key, Listing, Number, Pair, Quantity, Text, Whole, as_written, point
 from ..table import Entries, TableKind
-from .couplings import NUMBERS, volume_of_walls
+from .couplings import NUMBERS
 from .filament_types import TypeNames
 from .nucleation import has_places
 from .shapes import REGION, REGION_EXAMPLE, Region
 from .solvent import EDGES
+from .walls import volume_of_walls
 
 _QUANTITIES = {
     "binding_rate": (units.RATE, "zero", "Rate at which a hand binds that has filaments within reach."),

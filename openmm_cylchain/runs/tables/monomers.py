@@ -8,8 +8,8 @@ from ...filaments.presets import ACTIN_AGING, ACTIN_ATP, TUBULIN
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Inline, Key, Listing, Quantity, Text, WordOrQuantity
 from ..table import TableKind
-from .couplings import volume_of_walls
 from .solvent import EDGES
+from .walls import volume_of_walls
 
 PRESETS = {"ACTIN_ATP": ACTIN_ATP, "ACTIN_AGING": ACTIN_AGING, "TUBULIN": TUBULIN}
 """Monomers by the names that a configuration uses."""
