@@ -15,7 +15,7 @@ from .relaxation import relaxed_again
 from .tables.linkers import KEPT
 
 
-def following_simulation(before, stage, first, seed):
+def following_simulation(before, stage, first, seed, say=lambda message: None):
     """The Simulation of a stage, in the state in which that before has ended, and its BuiltSystem.
 
     Parameters
@@ -26,6 +26,13 @@ def following_simulation(before, stage, first, seed):
         The later one.
     seed : int
         By which linkers and filaments are chosen that are taken away.
+    say : callable (str), optional
+        Told at how many places planes cut filaments.
+
+    Warns
+    -----
+    StageWarning
+        If filaments stay whole that go through planes which cut them.
 
     Raises
     ------
@@ -54,7 +61,7 @@ def following_simulation(before, stage, first, seed):
     if have_come and stage.configuration.relaxes and all(own.growth is None for own in built.filaments):
         positions = new.context.getState(positions=True).getPositions(asNumpy=True)
         new.context.setPositions(relaxed_again(stage.configuration, built.filaments, positions, built.deleted))
-    cut_filaments(stage, (new, built))
+    cut_filaments(stage, (new, built), say)
     return new, built
 
 
