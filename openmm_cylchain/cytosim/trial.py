@@ -8,7 +8,9 @@ import warnings
 from ..errors import InputError, InstabilityError
 from .document import LEFT_OUT, NEAREST, Note, number_in, quantity
 
-_STEPS, _MOST_SECONDS = 100, 10.0
+_STEPS, _LEAST_OF_STAGE, _MOST_SECONDS = 1000, 100, 10.0
+"""Of a run in all, of each stage at least, and the time of a trial at most."""
+_SHOWN = 5
 _PARTS = (2, 5, 10, 20, 50, 100)
 
 
@@ -22,21 +24,28 @@ def try_first_steps(document, configuration, configuration_of):
         Of what it says.
     configuration_of : callable ()
         That of what it says after a change.
+
+    Returns
+    -------
+    str or None
+        That they could not all be tried.
     """
-    trouble = _trouble(configuration)
+    trouble, unknown = _trouble(configuration)
     if trouble is None:
-        return
+        return unknown
     tables = [own for own in document.tables if own.header in ("[simulation]", "[stage.simulation]")]
     whole = [(table, list(table.entries)) for table in tables]
     for parts in _PARTS:
         for table, entries in whole:
             table.entries = [_divided(entry, parts) for entry in entries]
-        if _trouble(configuration_of()) is None:
-            return
+        still, unknown = _trouble(configuration_of())
+        if still is None:
+            return unknown
     for table, entries in whole:
         table.entries = entries
     text = f"a start from which steps can be taken, however short: {trouble}"
     document.note(LEFT_OUT, text, None, "starts from which steps can be taken")
+    return None
 
 
 def _divided(entry, parts):
@@ -48,7 +57,7 @@ def _divided(entry, parts):
 
 
 def _trouble(configuration):
-    # Why a run does not take its first steps, in a sentence; None if it does, or if they take too long to know.
+    # Why a run does not take its first steps, or None; and what there was no time to know, or None: sentences.
     from ..runs.created_simulation import create_simulation
     from ..runs.dry_run import take_first_steps
     from ..runs.relaxation import relaxed_positions
@@ -67,13 +76,16 @@ def _trouble(configuration):
             stages = stages_of(configuration)
             simulation, built = create_simulation(stages[0].configuration)
             simulation.context.setPositions(relaxed_positions(stages[0].configuration, built, stop))
-            for _ in take_first_steps(stages, (simulation, built), _STEPS, _MOST_SECONDS):
-                pass
+            count = max(_LEAST_OF_STAGE, _STEPS // len(stages))
+            taken = take_first_steps(stages, (simulation, built), count, _MOST_SECONDS)
+            slow = [stage.name or "the run" for stage, missing in taken if missing]
     except (InputError, InstabilityError) as error:
-        return str(error)
+        return str(error), None
     except _TooLongError:
-        pass
-    return None
+        return None, f"Its filaments overlap, and do not come apart within {_MOST_SECONDS:g} s: it may not run."
+    if slow:
+        return None, f"Not all of the first steps were tried, since they are slow: {', '.join(slow[:_SHOWN])}."
+    return None, None
 
 
 class _TooLongError(Exception):

@@ -125,7 +125,7 @@ def _stages(stages, current):
     # In turn, with a few steps of each, which is to say that each can be begun.
     yield "  stages, each of which takes its first steps:"
     lasts = {stage.number: last for stage, last in named_stages(stages)}
-    for stage in take_first_steps(stages, current, _STEPS_OF_STAGE):
+    for stage, _ in take_first_steps(stages, current, _STEPS_OF_STAGE):
         if not stage.is_piece:
             last = lasts[stage.number]
             count = last.number - stage.number + 1
@@ -134,23 +134,26 @@ def _stages(stages, current):
 
 
 def take_first_steps(stages, current, count, most_seconds=float("inf")):
-    """Take a count of steps of each stage in turn, or fewer where they take long; each Stage before its steps.
+    """Take a count of steps of each stage in turn, or fewer where they take long: each Stage, and how many are missing.
 
-    ``current`` are the Simulation and the BuiltSystem of the first one, where it begins. InputError and
-    InstabilityError as in a run.
+    ``current`` are the Simulation and the BuiltSystem of the first one, where it begins. Each stage has an equal share
+    of the seconds of processors that are left. InputError and InstabilityError as in a run.
     """
     first, known, start = current, set(), time.process_time()
-    for stage in stages:
-        yield stage
-        if id(stage.configuration) in known:
-            continue
-        known.add(id(stage.configuration))
-        with naming_stage(stage), located_instability(stage.configuration), steps():
-            if stage.number:
-                current = following_simulation(current, stage, first, stages[0].configuration.simulation.seed)
-            for _ in range(min(count, stage.configuration.simulation.steps)):
-                if time.process_time() - start < most_seconds:
+    for place, stage in enumerate(stages):
+        left = 0
+        if id(stage.configuration) not in known:
+            known.add(id(stage.configuration))
+            with naming_stage(stage), located_instability(stage.configuration), steps():
+                if stage.number:
+                    current = following_simulation(current, stage, first, stages[0].configuration.simulation.seed)
+                now = time.process_time()
+                end = now + (start + most_seconds - now) / (len(stages) - place)
+                left = min(count, stage.configuration.simulation.steps)
+                while left and time.process_time() < end:
                     current[0].step(1)
+                    left -= 1
+        yield stage, left
 
 
 def _cost(configuration, stages, simulation, built):

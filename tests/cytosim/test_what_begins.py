@@ -182,6 +182,33 @@ def test_steps_are_shorter_where_the_first_ones_have_no_solution(tmp_path):
     simulation.step(100)
 
 
+def test_steps_are_shorter_where_later_ones_have_no_solution(tmp_path):
+    # Crossed in a plane, in which neither lets the other one through: it takes 300 steps to tell.
+    text = "set simul system { time_step = 0.005; kT = 0.0042; steric = 1, 400; dim = 2 }\n"
+    text += "set space dish { shape = circle }\nnew dish { radius = 1.1 }\n"
+    text += "set fiber rod { rigidity = 1; segmentation = 0.2; confine = inside, 100; steric = 1, 0.05 }\n"
+    text += "new rod { length = 1; position = 0 0 0; direction = 1 0 0 }\n"
+    text += "new rod { length = 1; position = 0 0 0; direction = 0 1 0 }\nrun 10000 system { nb_frames = 10 }\n"
+    path, output = tmp_path / "my.cym", tmp_path / "my.toml"
+    path.write_text(text)
+    said = import_file(path, output, trial=True)
+    found = read_configuration(output)
+    assert found.simulation.time_step < 5e9
+    assert not any("were tried" in line for line in said)
+    simulation, built = create_simulation(found)
+    begin(found, simulation, built)
+    simulation.step(1000)
+
+
+def test_what_there_was_no_time_to_try_is_said(tmp_path, monkeypatch):
+    path = tmp_path / "my.cym"
+    path.write_text(FLAT + DISC + TUBE + "new 3 tube { length = 1 }\n" + RUN + "change tube { rigidity = 10 }\n" + RUN)
+    assert not any("were tried" in line for line in import_file(path, tmp_path / "tried.toml", trial=True))
+    monkeypatch.setattr("openmm_cylchain.cytosim.trial._MOST_SECONDS", 0.0)
+    said = import_file(path, tmp_path / "my.toml", trial=True)
+    assert "  Not all of the first steps were tried, since they are slow: run 1, run 2." in said
+
+
 def test_spaces_that_deform_keep_their_shapes_and_say_so(tmp_path):
     cell = "set space cell { shape = dynamic_ellipse; tension = 1 }\nnew cell { length = 5, 5, 4 }\n"
     path = tmp_path / "my.cym"
