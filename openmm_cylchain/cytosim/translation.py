@@ -241,6 +241,8 @@ class Translation:
             if space is not None and still != shape:
                 own.settings.take_rest()
                 self.left_out(f"forces on {new.name}, which keeps its shape", new.line, f"spaces: {shape}")
+            if space is not None and space.thin:
+                self.document.note(NEAREST, f"{new.name} has a thickness of 0.2 nm, and none in Cytosim", new.line)
             if new.name not in self._spaces:
                 self._spaces[new.name] = space
             if space is None:

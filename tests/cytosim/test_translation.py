@@ -14,6 +14,7 @@ from openmm_cylchain.cytosim.spaces import make_space
 from openmm_cylchain.cytosim.translation import translate
 from openmm_cylchain.errors import InputError
 from openmm_cylchain.filaments.end_states import DynamicInstability, TwoUnitCap
+from openmm_cylchain.runs.created_simulation import begin, create_simulation
 from openmm_cylchain.units.quantities import BENDING_RIGIDITY, FORCE, STIFFNESS, VISCOSITY
 from support.cytosim_files import CELL, MICROMETER, RUN, SECOND, SYSTEM, TUBE, translated
 
@@ -811,6 +812,39 @@ def test_volumes_of_spaces_are_those_of_what_is_inside(shape, sizes, dimensions)
     assert error < 0.01 * space.volume
     drawn = np.array([space.draw(generator) for _ in range(200)])
     assert np.all(space.inside(drawn))
+
+
+THIN = [
+    ("square", "length = 20, 0, 0", "on", (0, 1, 1)),
+    ("sphere", "radius = 0", "point", (1, 1, 1)),
+    ("capsule", "length = 20; radius = 0", "on", (0, 1, 1)),
+    ("cylinder", "length = 0; radius = 5", "on", (1, 0, 0)),
+    ("cylinderZ", "bottom = 0; top = 0; radius = 0", "inside", (1, 1, 1)),
+]
+
+
+@pytest.mark.parametrize(("shape", "sizes", "mode", "held"), THIN)
+def test_planes_lines_and_points_hold_bodies_with_their_stiffness(tmp_path, shape, sizes, mode, held):
+    """Equipartition across a space that has no width, of 60 beads at 12 times; along it they go where they like."""
+    cell = f"set space rail {{ shape = {shape} }}\nnew rail {{ {sizes} }}\n"
+    text = f"set bead ball {{ confine = {mode}, 1 }}\nnew 60 ball {{ radius = 0.05; position = ball 1 }}\n"
+    found, document = translated(tmp_path, text, SYSTEM.replace("time_step = 0.001", "time_step = 0.005"), cell)
+    assert document.missing == [] and "has a thickness of 0.2 nm" in document.text()
+    simulation, built = create_simulation(found)
+    begin(found, simulation, built)
+    squares = []
+    for _ in range(13):
+        # Three times the relaxation of 6 pi eta R/k.
+        simulation.step(300)
+        positions = simulation.context.getState(positions=True).getPositions(asNumpy=True)._value
+        squares.append(positions[[own[0] for own in built.filaments.body_indices]] ** 2)
+    squares = np.array(squares[1:])
+    expected = 0.0042 / 1.0 * 1e6
+    for axis in np.flatnonzero(held):
+        error = expected * math.sqrt(2.0 / squares[..., axis].size)
+        assert error < 0.06 * expected
+        assert abs(squares[..., axis].mean() - expected) < 4 * error
+    assert np.all(squares.mean(axis=(0, 1))[np.flatnonzero(np.logical_not(held))] > 2 * expected)
 
 
 def test_unknown_places_and_directions_are_said(tmp_path):
