@@ -33,8 +33,8 @@ class Space:
     """A space: ``inside(points)`` says which of (n, 3) points are in it, ``half`` are the halves of its box.
 
     ``walls`` are tables of [[wall]] without stiffness, None if none of ours is that shape; ``region`` is where things
-    begin, None if there is none; ``edges`` are those of a periodic box, of which None does not repeat. It is ``thin`` if
-    it is a plane, a line or a point, all of which is its surface.
+    begin, None if there is none; ``edges`` are those of a periodic box, of which None does not repeat. It is ``thin``
+    if it is a plane, a line or a point, all of which is its surface.
     """
 
     shape: str

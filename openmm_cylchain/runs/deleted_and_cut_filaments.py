@@ -56,8 +56,8 @@ def cut_filaments(stage, current, say):
         in_context = built.filaments.in_context(simulation.context)
         places, cuts = np.sum([in_context.cut(plane, members[table]) for plane in planes], axis=0)
         text = (
-            f"{stage.name}: filaments of [[filament]] number {table} are cut at {cuts} of the {places} places at which they go "
-            "through its planes"
+            f"{stage.name}: filaments of [[filament]] number {table} are cut at {cuts} of the {places} places at which "
+            "they go through its planes"
         )
         say(f"{text}.")
         if cuts < places:
