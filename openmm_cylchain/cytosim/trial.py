@@ -8,8 +8,8 @@ import warnings
 from ..errors import InputError, InstabilityError
 from .document import LEFT_OUT, NEAREST, Note, number_in, quantity
 
-_STEPS, _LEAST_OF_STAGE, _MOST_SECONDS = 1000, 100, 10.0
-"""Of a run in all, of each stage at least, and the time of a trial at most."""
+_STEPS, _OF_STAGE, _MOST_SECONDS = 10_000, 100, 6.0
+"""Of a run at most, of each stage before it is said to be slow, and seconds of a trial at most."""
 _SHOWN = 5
 _PARTS = (2, 5, 10, 20, 50, 100)
 
@@ -76,9 +76,9 @@ def _trouble(configuration):
             stages = stages_of(configuration)
             simulation, built = create_simulation(stages[0].configuration)
             simulation.context.setPositions(relaxed_positions(stages[0].configuration, built, stop))
-            count = max(_LEAST_OF_STAGE, _STEPS // len(stages))
-            taken = take_first_steps(stages, (simulation, built), count, _MOST_SECONDS)
-            slow = [stage.name or "the run" for stage, missing in taken if missing]
+            count = max(_OF_STAGE, _STEPS // len(stages))
+            tried = take_first_steps(stages, (simulation, built), count, _MOST_SECONDS)
+            slow = [own.name or "the run" for own, taken in tried if taken is not None and taken < _steps_to_try(own)]
     except (InputError, InstabilityError) as error:
         return str(error), None
     except _TooLongError:
@@ -86,6 +86,10 @@ def _trouble(configuration):
     if slow:
         return None, f"Not all of the first steps were tried, since they are slow: {', '.join(slow[:_SHOWN])}."
     return None, None
+
+
+def _steps_to_try(stage):
+    return min(_OF_STAGE, stage.configuration.simulation.steps)
 
 
 class _TooLongError(Exception):

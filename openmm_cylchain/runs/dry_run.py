@@ -134,14 +134,15 @@ def _stages(stages, current):
 
 
 def take_first_steps(stages, current, count, most_seconds=float("inf")):
-    """Take a count of steps of each stage in turn, or fewer where they take long: each Stage, and how many are missing.
+    """Take a count of steps of each stage in turn, or fewer where they take long: each Stage, and how many were taken.
 
     ``current`` are the Simulation and the BuiltSystem of the first one, where it begins. Each stage has an equal share
-    of the seconds of processors that are left. InputError and InstabilityError as in a run.
+    of the seconds of processors that are left, and one that comes again takes none: None. InputError and
+    InstabilityError as in a run.
     """
     first, known, start = current, set(), time.process_time()
     for place, stage in enumerate(stages):
-        left = 0
+        taken = None
         if id(stage.configuration) not in known:
             known.add(id(stage.configuration))
             with naming_stage(stage), located_instability(stage.configuration), steps():
@@ -149,11 +150,11 @@ def take_first_steps(stages, current, count, most_seconds=float("inf")):
                     current = following_simulation(current, stage, first, stages[0].configuration.simulation.seed)
                 now = time.process_time()
                 end = now + (start + most_seconds - now) / (len(stages) - place)
-                left = min(count, stage.configuration.simulation.steps)
-                while left and time.process_time() < end:
+                taken = 0
+                while taken < min(count, stage.configuration.simulation.steps) and time.process_time() < end:
                     current[0].step(1)
-                    left -= 1
-        yield stage, left
+                    taken += 1
+        yield stage, taken
 
 
 def _cost(configuration, stages, simulation, built):
