@@ -9,7 +9,7 @@ from .attached import GROWING, PLACED, place_along
 from .bodies import attach_to_bodies, point_of_base
 from .document import EXACT, LEFT_OUT, NEAREST, Note, point, quantity
 from .hands import read_hand
-from .nucleation import add_nucleators
+from .nucleation import add_diffusing_nucleators, add_nucleators
 from .places import draw_inside, unknown_position
 from .script import count_of
 from .settings import OFF
@@ -204,10 +204,12 @@ def _singles(translation, own, new, linked):
     if "attach" in options or "attach1" in options:
         _attached(translation, own, new, linked, count, "attach" if "attach" in options else "attach1")
         return
+    hand = _nucleator(translation, own)
     if not fixed:
-        linked.count += count
+        if hand is None or not add_diffusing_nucleators(translation, own, new, hand.settings, count):
+            linked.count += count
         return
-    points, hand = _points(translation, new, count, len(linked.points)), _nucleator(translation, own)
+    points = _points(translation, new, count, len(linked.points))
     if hand is not None and add_nucleators(translation, new, hand.settings, points):
         linked.nucleators += points
     else:

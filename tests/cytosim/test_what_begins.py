@@ -157,6 +157,47 @@ def test_nucleators_make_one_fiber_each_and_hold_it(tmp_path):
         assert table.arc_lengths[number, 1] < 10.0
 
 
+def test_nucleators_that_diffuse_make_one_fiber_each_where_they_are(tmp_path):
+    cell = "set space cell { shape = square }\nnew cell { length = 8, 8, 8 }\n"
+    cell += "set space floor { shape = strip }\nnew floor { length = 6, 4; bottom = -1; top = -1 }\n"
+    single = "set single seed { hand = maker; diffusion = 1; confine = on,, floor }\nnew 60 seed\n"
+    maker = NUCLEATOR.partition("set single")[0]
+    found, document = translated(tmp_path, GROWING + maker + single, cell=cell, run="run 100 system\n")
+    assert document.missing == [] and document.tables_called("[[linkers]]") == []
+    assert [group.count for group in found.filaments] == [1] * 60
+    simulation, built = create_simulation(found)
+    begin(found, simulation, built)
+    simulation.step(20)
+    nodes = built.filaments.in_context(simulation.context).growth().nodes
+    # A share of 1 - exp(-rate t), uniform in the floor.
+    share = 1.0 - math.exp(-40 * 0.02)
+    assert abs(np.sum(nodes > 0) - 60 * share) < 4 * math.sqrt(60 * share * (1 - share))
+    positions = simulation.context.getState(positions=True).getPositions(asNumpy=True)._value
+    first = np.array([positions[own[0]] for own, count in zip(built.filaments.node_indices, nodes) if count])
+    assert np.abs(first[:, 2] + 1000).max() < 300
+    assert np.all(first[:, :2].max(axis=0) < [3100, 2100]) and np.all(np.ptp(first[:, :2], axis=0) > [4000, 2700])
+
+
+def test_nucleators_that_let_go_make_others(tmp_path):
+    maker = NUCLEATOR.partition("set single")[0].replace("unbinding = 0, 3", "unbinding = 10")
+    text = GROWING + maker + "set single seed { hand = maker; diffusion = 1 }\nnew 30 seed\n"
+    found, document = translated(tmp_path, text)
+    assert document.missing == []
+    (group,) = found.filaments
+    # In each, 1/40 s for making one and 1/10 s for letting go.
+    assert group.nucleation.rate == pytest.approx(30 / (1 / 40 + 1 / 10) / SECOND, rel=1e-6)
+    assert "each of which makes one at nucleate = 40 and lets go at 10" in document.text()
+
+
+@pytest.mark.parametrize("single", ["confine = surface", "diffusion = 1; hand = other"])
+def test_other_nucleators_are_left_out(tmp_path, single):
+    maker = NUCLEATOR.partition("set single")[0]
+    text = GROWING + maker + maker.replace("maker", "other").replace("unbinding", "addictive = 1; unbinding")
+    text += f"set single seed {{ hand = maker; {single} }}\nnew 5 seed\nnew tube {{ length = 1 }}\n"
+    _, document = translated(tmp_path, text)
+    assert "hands: nucleate" in document.missing
+
+
 def test_steps_are_shorter_where_the_first_ones_have_no_solution(tmp_path):
     # An aster outside of its cell, whose walls push it in.
     text = "set fiber tube { rigidity = 30; segmentation = 1; confine = inside, 100 }\nset solid core { }\n"
