@@ -1,4 +1,7 @@
-"""The first steps of what is written: where they have no solution at the time step of Cytosim, in shorter ones."""
+"""The first steps of what is written: where they have no solution at the time step of Cytosim, in shorter ones.
+
+Where even these have none, without contacts: those of Cytosim let filaments through each other.
+"""
 
 import contextlib
 import io
@@ -11,11 +14,14 @@ from .document import LEFT_OUT, NEAREST, Note, number_in, quantity
 _STEPS, _OF_STAGE, _MOST_SECONDS = 10_000, 100, 6.0
 """Of a run at most, of each stage before it is said to be slow, and seconds of a trial at most."""
 _SHOWN = 5
+_NEEDS = "starts from which steps can be taken"
 _PARTS = (2, 5, 10, 20, 50, 100)
 
 
 def try_first_steps(document, configuration, configuration_of):
     """Divide the time steps of a Document until its run takes its first steps, and say so where that was needed.
+
+    Contacts are turned off where that is of no help.
 
     Parameters
     ----------
@@ -43,8 +49,19 @@ def try_first_steps(document, configuration, configuration_of):
             return unknown
     for table, entries in whole:
         table.entries = entries
-    text = f"a start from which steps can be taken, however short: {trouble}"
-    document.note(LEFT_OUT, text, None, "starts from which steps can be taken")
+    touching = [own for own in document.tables if own.header in ("[contacts]", "[stage.contacts]")]
+    whole = [(table, list(table.entries)) for table in touching]
+    for table in touching:
+        text = f"contacts, with which the first steps have no solution, however short: {trouble}"
+        table.entries = [entry for entry in table.entries if entry[0] != "active"]
+        table.add("active", False, Note(LEFT_OUT, text, table.line, _NEEDS))
+    if touching:
+        still, unknown = _trouble(configuration_of())
+        if still is None:
+            return unknown
+    for table, entries in whole:
+        table.entries = entries
+    document.note(LEFT_OUT, f"a start from which steps can be taken, however short: {trouble}", None, _NEEDS)
     return None
 
 
@@ -59,11 +76,11 @@ def _divided(entry, parts):
 def _trouble(configuration):
     # Why a run does not take its first steps, or None; and what there was no time to know, or None: sentences.
     from ..runs.created_simulation import create_simulation
-    from ..runs.dry_run import take_first_steps
+    from ..runs.dry_run import STEPS_OF_STAGE, take_first_steps
     from ..runs.relaxation import relaxed_positions
     from ..runs.stages import stages_of
 
-    start = time.process_time()
+    start, slow = time.process_time(), []
 
     def stop(_):
         if time.process_time() - start > _MOST_SECONDS:
@@ -74,22 +91,25 @@ def _trouble(configuration):
             # The run itself warns.
             warnings.simplefilter("ignore")
             stages = stages_of(configuration)
-            simulation, built = create_simulation(stages[0].configuration)
-            simulation.context.setPositions(relaxed_positions(stages[0].configuration, built, stop))
-            count = max(_OF_STAGE, _STEPS // len(stages))
-            tried = take_first_steps(stages, (simulation, built), count, _MOST_SECONDS)
-            slow = [own.name or "the run" for own, taken in tried if taken is not None and taken < _steps_to_try(own)]
+            first = stages[0].configuration
+            simulation, built = create_simulation(first)
+            positions = relaxed_positions(first, built, stop)
+            # What comes in later stages meets what has hardly moved in a dry run.
+            counts = [max(_OF_STAGE, _STEPS // len(stages)), *([STEPS_OF_STAGE] if len(stages) > 1 else [])]
+            for count in counts:
+                simulation.context.reinitialize()
+                simulation.context.setPositions(positions)
+                for stage, taken in take_first_steps(stages, (simulation, built), count, _MOST_SECONDS):
+                    if taken is not None and taken < min(_OF_STAGE, count, stage.configuration.simulation.steps):
+                        slow.append(stage.name or "the run")
     except (InputError, InstabilityError) as error:
         return str(error), None
     except _TooLongError:
         return None, f"Its filaments overlap, and do not come apart within {_MOST_SECONDS:g} s: it may not run."
     if slow:
-        return None, f"Not all of the first steps were tried, since they are slow: {', '.join(slow[:_SHOWN])}."
+        names = ", ".join(list(dict.fromkeys(slow))[:_SHOWN])
+        return None, f"Not all of the first steps were tried, since they are slow: {names}."
     return None, None
-
-
-def _steps_to_try(stage):
-    return min(_OF_STAGE, stage.configuration.simulation.steps)
 
 
 class _TooLongError(Exception):

@@ -22,7 +22,7 @@ from .summary import group_labels, group_members
 
 _MEASURED_SECONDS = 3.0
 _PER_SECOND, _PER_SECOND_AND_UM = 1e12, 1e15
-_STEPS_OF_STAGE = 2
+STEPS_OF_STAGE = 2
 _BYTES_OF_NUMBER = 20
 """Of a number in a table, with its comma."""
 
@@ -125,7 +125,7 @@ def _stages(stages, current):
     # In turn, with a few steps of each, which is to say that each can be begun.
     yield "  stages, each of which takes its first steps:"
     lasts = {stage.number: last for stage, last in named_stages(stages)}
-    for stage, _ in take_first_steps(stages, current, _STEPS_OF_STAGE):
+    for stage, _ in take_first_steps(stages, current, STEPS_OF_STAGE):
         if not stage.is_piece:
             last = lasts[stage.number]
             count = last.number - stage.number + 1

@@ -9,7 +9,8 @@ from openmm_cylchain.cytosim.command import import_file
 from openmm_cylchain.cytosim.translation import translate
 from openmm_cylchain.runs.configuration import read_configuration
 from openmm_cylchain.runs.created_simulation import begin, create_simulation
-from support.cytosim_files import RUN, SECOND, SYSTEM, TUBE, translated
+from openmm_cylchain.runs.stages import stages_of
+from support.cytosim_files import CELL, RUN, SECOND, SYSTEM, TUBE, translated
 
 # Steps are those of Cytosim, which resolve less.
 pytestmark = pytest.mark.filterwarnings("ignore::openmm_cylchain.TimeStepWarning")
@@ -239,6 +240,31 @@ def test_steps_are_shorter_where_later_ones_have_no_solution(tmp_path):
     simulation, built = create_simulation(found)
     begin(found, simulation, built)
     simulation.step(1000)
+
+
+@pytest.mark.parametrize(("system", "change"), [("steric = 1, 10", ""), ("", "change system { steric = 1, 10 }\n")])
+def test_contacts_with_which_no_step_can_be_taken_are_turned_off(tmp_path, monkeypatch, system, change):
+    """From the beginning, and in a later stage."""
+
+    def trouble(configuration):
+        touch = any(stage.configuration.contacts is not None for stage in stages_of(configuration))
+        return ("Filament 0 would pass through filament 1." if touch else None), None
+
+    monkeypatch.setattr("openmm_cylchain.cytosim.trial._trouble", trouble)
+    path, output = tmp_path / "my.cym", tmp_path / "my.toml"
+    tube = TUBE.replace("rigidity", "steric = 1, 0.02; rigidity") + "new 3 tube { length = 1 }\n"
+    path.write_text(SYSTEM.replace("dim", f"{system}; dim") + CELL + tube + RUN + change + RUN)
+    said = import_file(path, output, trial=True)
+    assert any(
+        "contacts, with which the first steps have no solution, however short: Filament 0" in own for own in said
+    )
+    found = read_configuration(output)
+    assert found.simulation.time_step == 1e9
+    assert not any(stage.configuration.contacts for stage in stages_of(found))
+    # They can be turned on again.
+    assert output.read_text().count("active = false") == 1
+    output.write_text(output.read_text().replace("active = false", "active = true"))
+    assert stages_of(read_configuration(output))[-1].configuration.contacts.diameter == 40
 
 
 def test_what_there_was_no_time_to_try_is_said(tmp_path, monkeypatch):
