@@ -249,6 +249,20 @@ def _cylinder(sizes, dimensions, axis=0):
     return Space("cylinder", sizes_of_box, inside, volume, surface, walls, region, middle=middle)
 
 
+def _bicylinder(sizes, dimensions):
+    # Where two cylinders along x and y cross.
+    radius = sizes.radius()
+    if not radius or dimensions == 2:
+        return None
+
+    def inside(at):
+        return np.maximum(at[..., 0] ** 2, at[..., 1] ** 2) + at[..., 2] ** 2 <= radius**2
+
+    size = quantity(radius, "um")
+    walls = [{"shape": "cylinder", "axis": axis, "radius": size} for axis in ([1, 0, 0], [0, 1, 0])]
+    return Space("bicylinder", np.full(3, radius), inside, 16.0 / 3.0 * radius**3, 16.0 * radius**2, walls)
+
+
 def _cylinder_periodic(sizes, dimensions):
     space = _cylinder(sizes, dimensions)
     if space is None:
@@ -388,6 +402,7 @@ SHAPES = {
     "cylinderZ": lambda sizes, dimensions: _cylinder(sizes, dimensions, 2),
     "disc": lambda sizes, dimensions: _sphere(sizes, 2) if dimensions == 2 else _cylinder(sizes, dimensions, 2),
     "cylinderP": _cylinder_periodic,
+    "bicylinder": _bicylinder,
     "periodic": _periodic,
     "strip": _strip,
     "annulus": _annular,

@@ -123,7 +123,7 @@ def _add_wall(translation, own, whole, held, every):
         for key, value in wall.items():
             table.add(key, value, Note(EXACT, f"confine, {own.stiffness:g}" if key == "shape" else "", line))
         table.add("stiffness", quantity(own.stiffness, "pN/um"), Note(EXACT, "of each node"))
-        if wall["shape"] == "prism":
+        if wall["shape"] == "prism" or space.shape == "bicylinder":
             table.comment(Note(NEAREST, "what is beyond a corner is pushed by both sides, each by its own distance"))
         if side != "inside":
             table.add("side", side)

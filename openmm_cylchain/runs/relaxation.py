@@ -1,5 +1,6 @@
 """Filaments that are drawn on top of each other come apart before a run begins."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +23,8 @@ _MOST_SHIFTS, _SHIFT = 3, 0.1
 """How often a filament is shifted that does not come apart, and how far along each axis, in diameters of contacts."""
 _LEAST_CHANCE, _MOST_ROUNDS = 3e-4, 100
 """Of the deepest contact, or as many steps follow again; and how often."""
+_FULLEST = math.pi / math.sqrt(12.0)
+"""Share of a box that cylinders fill at most."""
 _ALL_STEPS = _STEPS * (len(_COLD) + len(_WARM))
 
 
@@ -100,6 +103,7 @@ def relaxed_again(configuration, begun, positions, deleted):
 def _come_apart(configuration, positions, progress, begun=None, deleted=frozenset()):
     settings, temperature = configuration.simulation, configuration.solvent.temperature
     alone = build_system(configuration, settings.engine, settings.seed, kinetics=False, begun=begun, deleted=deleted)
+    _refuse_if_full(configuration, alone.filaments)
     recommended = alone.filaments.recommended_time_step(settings.scheme, system=alone.system, **alone.arguments())
     longest = min(settings.time_step, recommended.step)
     integrator = alone.filaments.create_integrator(
@@ -142,6 +146,22 @@ def _come_apart(configuration, positions, progress, begun=None, deleted=frozense
                 ) from None
         positions = _shifted(positions, alone.filaments, number, configuration.contacts.diameter, settings.seed, shift)
     return positions
+
+
+def _refuse_if_full(configuration, filaments):
+    if configuration.box is None:
+        return
+    diameter = configuration.contacts.diameter
+    there = [own for own in filaments if own.takes_part]
+    length = sum(float(np.linalg.norm(np.diff(own.positions, axis=0), axis=1).sum()) for own in there)
+    share, most = length * math.pi * diameter**2 / 4.0 / math.prod(configuration.box), _FULLEST
+    if all(own.planar for own in there):
+        share, most = length * diameter / math.prod(configuration.box[:2]), 1.0
+    if share > most:
+        raise InputError(
+            f"[contacts] filaments with a diameter of {diameter:g} nm would fill {100 * share:.0f} % of the box, in "
+            "which they cannot come apart. Begin with fewer filaments or with a smaller diameter, or set relax = false."
+        )
 
 
 def _chance_of_deepest(context, temperature):

@@ -450,6 +450,18 @@ def test_walls_contacts_and_boxes(tmp_path):
         assert document.missing == []
 
 
+def test_walls_of_two_cylinders_that_cross(tmp_path):
+    cell = "set space cell { shape = bicylinder }\nnew cell { radius = 4 }\n"
+    fiber = "set fiber tube { rigidity = 20; confine = inside, 100 }\nnew 9 tube { length = 1 }\n"
+    found, document = translated(tmp_path, fiber, cell=cell)
+    assert [wall.shape.axis.tolist() for wall in found.walls] == [[1, 0, 0], [0, 1, 0]]
+    assert document.missing == []
+    middles = np.array(found.filaments[0].positions).mean(axis=1) / MICROMETER
+    assert np.all(np.maximum(middles[:, 0] ** 2, middles[:, 1] ** 2) + middles[:, 2] ** 2 <= 16.0)
+    _, document = translated(tmp_path, fiber.replace("inside", "on"), cell=cell)
+    assert document.missing == ["surfaces: surface of a bicylinder"]
+
+
 def test_walls_of_some_fibers_and_several_of_one(tmp_path):
     cells = "set space cell { shape = sphere }\nnew cell { radius = 9 }\n"
     cells += "set space core { shape = capsule }\nnew core { length = 8; radius = 2 }\n"
@@ -785,6 +797,7 @@ SHAPES = [
     ("ellipse", "length = 2, 3, 4", 3),
     ("cylinder", "length = 4; radius = 1", 3),
     ("cylinderZ", "bottom = -1; top = 2; radius = 1", 3),
+    ("bicylinder", "radius = 2", 3),
     ("torus", "curvature = 3; width = 1", 3),
     ("torus", "curvature = 3; width = 1", 2),
     ("annulus", "inner = 1; outer = 2", 2),
