@@ -54,7 +54,7 @@ def try_first_steps(document, configuration, configuration_of):
     for table in touching:
         text = f"contacts, with which the first steps have no solution, however short: {trouble}"
         table.entries = [entry for entry in table.entries if entry[0] != "active"]
-        table.add("active", False, Note(LEFT_OUT, text, table.line, _NEEDS))
+        table.add("active", False, Note(LEFT_OUT, text, None, _NEEDS))
     if touching:
         still, unknown = _trouble(configuration_of())
         if still is None:
