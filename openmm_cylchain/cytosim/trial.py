@@ -12,7 +12,7 @@ from ..errors import InputError, InstabilityError
 from .document import LEFT_OUT, NEAREST, Note, number_in, quantity
 
 _STEPS, _OF_STAGE, _MOST_SECONDS = 10_000, 100, 6.0
-"""Of a run at most, of each stage before it is said to be slow, and seconds of a trial at most."""
+"""Of a run at most, of each stage before it is said to be slow, and seconds of these at most."""
 _SHOWN = 5
 _NEEDS = "starts from which steps can be taken"
 _PARTS = (2, 5, 10, 20, 50, 100)
@@ -80,10 +80,10 @@ def _trouble(configuration):
     from ..runs.relaxation import relaxed_positions
     from ..runs.stages import stages_of
 
-    start, slow = time.process_time(), []
+    start, longest, slow = time.process_time(), 2.0 * _MOST_SECONDS, []
 
-    def stop(_):
-        if time.process_time() - start > _MOST_SECONDS:
+    def stop():
+        if time.process_time() - start > longest:
             raise _TooLongError
 
     try:
@@ -93,19 +93,19 @@ def _trouble(configuration):
             stages = stages_of(configuration)
             first = stages[0].configuration
             simulation, built = create_simulation(first)
-            positions = relaxed_positions(first, built, stop)
+            positions = relaxed_positions(first, built, lambda _: None, stop)
             # What comes in later stages meets what has hardly moved in a dry run.
             counts = [max(_OF_STAGE, _STEPS // len(stages)), *([STEPS_OF_STAGE] if len(stages) > 1 else [])]
             for count in counts:
                 simulation.context.reinitialize()
                 simulation.context.setPositions(positions)
-                for stage, taken in take_first_steps(stages, (simulation, built), count, _MOST_SECONDS):
+                for stage, taken in take_first_steps(stages, (simulation, built), count, _MOST_SECONDS, stop):
                     if taken is not None and taken < min(_OF_STAGE, count, stage.configuration.simulation.steps):
                         slow.append(stage.name or "the run")
     except (InputError, InstabilityError) as error:
         return str(error), None
     except _TooLongError:
-        return None, f"Its filaments overlap, and do not come apart within {_MOST_SECONDS:g} s: it may not run."
+        return None, f"Its filaments overlap, and do not come apart within {longest:g} s: it may not run."
     if slow:
         names = ", ".join(list(dict.fromkeys(slow))[:_SHOWN])
         return None, f"Not all of the first steps were tried, since they are slow: {names}."

@@ -133,12 +133,12 @@ def _stages(stages, current):
             yield f"    {stage.name}: from {format_time(stage.begin)} to {format_time(last.end)}{divided}"
 
 
-def take_first_steps(stages, current, count, most_seconds=float("inf")):
+def take_first_steps(stages, current, count, most_seconds=float("inf"), stop=None):
     """Take a count of steps of each stage in turn, or fewer where they take long: each Stage, and how many were taken.
 
     ``current`` are the Simulation and the BuiltSystem of the first one, where it begins. Each stage has an equal share
-    of the seconds of processors that are left, and one that comes again takes none: None. InputError and
-    InstabilityError as in a run.
+    of the seconds of processors that are left, and one that comes again takes none: None. ``stop`` is called after each
+    step between stages. InputError and InstabilityError as in a run.
     """
     first, known, start = current, set(), time.process_time()
     for place, stage in enumerate(stages):
@@ -147,7 +147,8 @@ def take_first_steps(stages, current, count, most_seconds=float("inf")):
             known.add(id(stage.configuration))
             with naming_stage(stage), located_instability(stage.configuration), steps():
                 if stage.number:
-                    current = following_simulation(current, stage, first, stages[0].configuration.simulation.seed)
+                    seed = stages[0].configuration.simulation.seed
+                    current = following_simulation(current, stage, first, seed, stop=stop)
                 now = time.process_time()
                 end = now + (start + most_seconds - now) / (len(stages) - place)
                 taken = 0

@@ -28,7 +28,7 @@ _FULLEST = math.pi / math.sqrt(12.0)
 _ALL_STEPS = _STEPS * (len(_COLD) + len(_WARM))
 
 
-def relaxed_positions(configuration, built, say=None):
+def relaxed_positions(configuration, built, say=None, stop=None):
     """Positions in which a run begins: those of a BuiltSystem, or where contacts have pushed what overlapped.
 
     Linkers that begin bound near anchors are bound then, which a Context has that is made or initialised later.
@@ -41,6 +41,8 @@ def relaxed_positions(configuration, built, say=None):
     built : BuiltSystem
     say : callable (str), optional
         Told how far it is where it takes longer than two seconds; lines of standard error if not given.
+    stop : callable (), optional
+        Called after each step; what it raises ends the relaxation.
 
     Raises
     ------
@@ -50,10 +52,10 @@ def relaxed_positions(configuration, built, say=None):
     if not configuration.relaxes:
         return built.positions
     if say is not None:
-        return _begun(configuration, built, _progress(say))
+        return _begun(configuration, built, _progress(say), stop)
     messages = ProgressMessages()
     try:
-        return _begun(configuration, built, _progress(messages))
+        return _begun(configuration, built, _progress(messages), stop)
     finally:
         messages.finish()
 
@@ -62,8 +64,8 @@ def _progress(say):
     return LateMessages(say, "filaments that overlap come apart before the first step: {} of {} steps", _ALL_STEPS)
 
 
-def _begun(configuration, built, progress):
-    positions = _come_apart(configuration, built.positions, progress)
+def _begun(configuration, built, progress, stop):
+    positions = _come_apart(configuration, built.positions, progress, stop)
     if any(own.bound and own.anchors is not None for own in configuration.linkers):
         _bind_linkers(configuration, built, positions._value)
     return positions
@@ -88,19 +90,21 @@ def _bind_linkers(configuration, built, positions):
     place_linkers(find_binding_force(built.system), linkers, moved, filaments.temperature, positions, box)
 
 
-def relaxed_again(configuration, begun, positions, deleted):
+def relaxed_again(configuration, begun, positions, deleted, stop=None):
     """Positions in the midst of a run, as a quantity, where filaments that have come may overlap with others.
 
-    ``begun`` are Filaments whose initial places are those of the run, ``deleted`` the numbers of those that have gone.
+    ``begun`` are Filaments whose initial places are those of the run, ``deleted`` the numbers of those that have gone;
+    ``stop`` is called after each step.
     """
     messages = ProgressMessages()
     try:
-        return _come_apart(configuration, positions, _progress(messages), begun, deleted)
+        return _come_apart(configuration, positions, _progress(messages), stop, begun, deleted)
     finally:
         messages.finish()
 
 
-def _come_apart(configuration, positions, progress, begun=None, deleted=frozenset()):
+def _come_apart(configuration, positions, progress, stop, begun=None, deleted=frozenset()):
+    stop = stop or (lambda: None)
     settings, temperature = configuration.simulation, configuration.solvent.temperature
     alone = build_system(configuration, settings.engine, settings.seed, kinetics=False, begun=begun, deleted=deleted)
     _refuse_if_full(configuration, alone.filaments)
@@ -129,12 +133,14 @@ def _come_apart(configuration, positions, progress, begun=None, deleted=frozense
                     integrator.setStepSize(length * longest)
                     for _ in range(_STEPS):
                         integrator.step(1)
+                        stop()
                         if shift == 0:
                             progress.one_is_done()
             integrator.setStepSize(recommended.step)
             rounds = 0
             while rounds < _MOST_ROUNDS and _chance_of_deepest(context, temperature) < _LEAST_CHANCE:
                 integrator.step(_STEPS)
+                stop()
                 rounds += 1
             return context.getState(positions=True).getPositions(asNumpy=True)
         except (InstabilityError, OpenMMException) as error:

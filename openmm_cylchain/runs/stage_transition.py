@@ -15,7 +15,7 @@ from .relaxation import relaxed_again
 from .tables.linkers import KEPT
 
 
-def following_simulation(before, stage, first, seed, say=lambda message: None):
+def following_simulation(before, stage, first, seed, say=lambda message: None, stop=None):
     """The Simulation of a stage, in the state in which that before has ended, and its BuiltSystem.
 
     Parameters
@@ -28,6 +28,8 @@ def following_simulation(before, stage, first, seed, say=lambda message: None):
         By which linkers and filaments are chosen that are taken away.
     say : callable (str), optional
         Told at how many places planes cut filaments.
+    stop : callable (), optional
+        Called after each step in which filaments that have come push others apart.
 
     Warns
     -----
@@ -60,7 +62,7 @@ def following_simulation(before, stage, first, seed, say=lambda message: None):
     have_come = any(own.takes_part and not other.takes_part for other, own in pairs)
     if have_come and stage.configuration.relaxes and all(own.growth is None for own in built.filaments):
         positions = new.context.getState(positions=True).getPositions(asNumpy=True)
-        new.context.setPositions(relaxed_again(stage.configuration, built.filaments, positions, built.deleted))
+        new.context.setPositions(relaxed_again(stage.configuration, built.filaments, positions, built.deleted, stop))
     cut_filaments(stage, (new, built), say)
     return new, built
 

@@ -274,6 +274,11 @@ def test_what_there_was_no_time_to_try_is_said(tmp_path, monkeypatch):
     monkeypatch.setattr("openmm_cylchain.cytosim.trial._MOST_SECONDS", 0.0)
     said = import_file(path, tmp_path / "my.toml", trial=True)
     assert "  Not all of the first steps were tried, since they are slow: run 1, run 2." in said
+    # Nor for filaments to come apart, those of a later run among them.
+    thick = path.read_text().replace("rigidity", "steric = 1, 0.05; rigidity", 1).replace("dim", "steric = 1, 9; dim")
+    path.write_text(thick)
+    said = import_file(path, tmp_path / "thick.toml", trial=True)
+    assert "  Its filaments overlap, and do not come apart within 0 s: it may not run." in said
 
 
 def test_spaces_that_deform_keep_their_shapes_and_say_so(tmp_path):
