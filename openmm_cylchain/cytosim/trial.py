@@ -21,6 +21,7 @@ _PARTS = (2, 5, 10, 20, 50, 100)
 def try_first_steps(document, configuration, configuration_of):
     """Divide the time steps of a Document until its run takes its first steps, and say so where that was needed.
 
+    As what follows may need shorter ones by chance, the next shorter one is taken after the longest that will do.
     Contacts are turned off where that is of no help.
 
     Parameters
@@ -41,12 +42,14 @@ def try_first_steps(document, configuration, configuration_of):
         return unknown
     tables = [own for own in document.tables if own.header in ("[simulation]", "[stage.simulation]")]
     whole = [(table, list(table.entries)) for table in tables]
+    will_do = False
     for parts in _PARTS:
         for table, entries in whole:
             table.entries = [_divided(entry, parts) for entry in entries]
         still, unknown = _trouble(configuration_of())
-        if still is None:
+        if still is None and (will_do or unknown or parts == _PARTS[-1]):
             return unknown
+        will_do = still is None
     for table, entries in whole:
         table.entries = entries
     touching = [own for own in document.tables if own.header in ("[contacts]", "[stage.contacts]")]
