@@ -8,6 +8,8 @@ import io
 import time
 import warnings
 
+from openmm import OpenMMException
+
 from ..errors import InputError, InstabilityError
 from .document import LEFT_OUT, NEAREST, Note, number_in, quantity
 
@@ -105,7 +107,7 @@ def _trouble(configuration):
                 for stage, taken in take_first_steps(stages, (simulation, built), count, _MOST_SECONDS, stop):
                     if taken is not None and taken < min(_OF_STAGE, count, stage.configuration.simulation.steps):
                         slow.append(stage.name or "the run")
-    except (InputError, InstabilityError) as error:
+    except (InputError, InstabilityError, OpenMMException) as error:
         return str(error), None
     except _TooLongError:
         return None, f"Its filaments overlap, and do not come apart within {longest:g} s: it may not run."
