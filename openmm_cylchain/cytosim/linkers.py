@@ -294,6 +294,7 @@ def _single_table(translation, own, linked):
     (hand,) = _hands_of(translation, own)
     if not _binds(translation, own, [hand]):
         return
+    _let_hold(translation, own, linked, [hand])
     table = translation.document.table("[[linkers]]", own.line)
     table.add("name", own.name, Note(EXACT, f"single {own.name}", own.line))
     _add_spring(translation, table, own)
@@ -350,6 +351,7 @@ def _couple_table(translation, own, linked):
     hands = _hands_of(translation, own)
     if not _binds(translation, own, hands):
         return
+    _let_hold(translation, own, linked, hands)
     activity = settings.text("activity", default="diffuse")
     if activity in ("slide", "shackle"):
         _let_slide(translation, own, hands[0])
@@ -420,6 +422,23 @@ def _add_spring(translation, table, own):
         if own.settings.text("activity") == "bridge":
             note = Note(EXACT, "activity = bridge")
         table.add("rest_length", quantity(length, "um"), note)
+
+
+def _let_hold(translation, own, linked, hands):
+    # Cytosim attaches hands also to fibers to which they do not bind, here those that never bind.
+    for place in list(linked.places):
+        for hand, key in zip(hands, ("filament", "second_filament")):
+            types = {translation.type_name(translation.made[number].name) for number in place.get(key, ())}
+            others = sorted(types - set(hand.types))
+            if others and not hand.table["binding_rate"].startswith("0 "):
+                text = f"{own.name} attached to {', '.join(others)}, to which hand {hand.name} does not bind"
+                translation.left_out(text, own.line, PLACED)
+                linked.places.remove(place)
+                break
+            if others:
+                hand.types = [*hand.types, *others]
+                hand.table["binds_to"] = hand.types
+                hand.note(EXACT, f"it is attached to {', '.join(others)}, and never binds", own.line)
 
 
 def _add_bound(table, own, linked, hand):

@@ -155,9 +155,10 @@ def _come_apart(configuration, positions, progress, stop, begun=None, deleted=fr
 
 
 def _refuse_if_full(configuration, filaments):
-    if configuration.box is None:
-        return
     diameter = configuration.contacts.diameter
+    if configuration.box is None or diameter is None:
+        # Of bodies alone.
+        return
     there = [own for own in filaments if own.takes_part]
     length = sum(float(np.linalg.norm(np.diff(own.positions, axis=0), axis=1).sum()) for own in there)
     share, most = length * math.pi * diameter**2 / 4.0 / math.prod(configuration.box), _FULLEST

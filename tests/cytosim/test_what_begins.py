@@ -127,6 +127,24 @@ def test_couples_begin_where_both_hands_are_attached(unbinding, growth, tmp_path
     np.testing.assert_allclose(table.arc_lengths[0], [200.0, 500.0])
 
 
+@pytest.mark.parametrize(("rate", "held"), [(0, 2), (3, 1)])
+def test_hands_are_attached_to_fibers_to_which_they_do_not_bind(tmp_path, rate, held):
+    """If they never bind, so that they do not come back to them."""
+    text = (
+        TUBE + "set fiber rod { rigidity = 20; binding_key = 2 }\nnew 2 tube { length = 2 }\nnew 2 rod { length = 2 }\n"
+    )
+    text += f"set hand glue {{ binding = {rate}, 0.05; unbinding = 0.1; binding_key = 1 }}\n"
+    text += "set couple bridge { hand1 = glue; hand2 = glue; stiffness = 100; diffusion = 1 }\n"
+    text += "new bridge { attach1 = tube1, 0.5; attach2 = rod1, 1 }\nnew bridge { attach1 = tube2, 0.5 }\n"
+    found, document = translated(tmp_path, text)
+    (group,) = found.linkers
+    assert len(group.bound_at) == held and group.count == 2
+    assert document.missing == ([] if held == 2 else ["linkers that begin bound at given places"])
+    simulation, built = create_simulation(found)
+    begin(found, simulation, built)
+    assert np.sum(built.filaments.in_context(simulation.context).linkers().filaments >= 0) == (3 if held == 2 else 1)
+
+
 NUCLEATOR = """set hand maker { unbinding = 0, 3; activity = nucleate;
  nucleate = 40, tube, ( length = 0.2; plus_end = grow ) }
 set single seed { hand = maker; activity = fixed; stiffness = 1000 }
@@ -265,6 +283,16 @@ def test_contacts_with_which_no_step_can_be_taken_are_turned_off(tmp_path, monke
     assert output.read_text().count("active = false") == 1
     output.write_text(output.read_text().replace("active = false", "active = true"))
     assert stages_of(read_configuration(output))[-1].configuration.contacts.diameter == 40
+
+
+def test_first_steps_of_beads_in_a_periodic_space(tmp_path):
+    text = SYSTEM.replace("dim", "steric = 1, 100; dim") + "set space cell { shape = periodic }\n"
+    text += "new cell { length = 4, 4, 4 }\nset bead ball { steric = 1 }\nnew 20 ball { radius = 0.3 }\n" + RUN
+    path = tmp_path / "my.cym"
+    path.write_text(text)
+    said = import_file(path, tmp_path / "my.toml", trial=True)
+    assert "  left out: nothing" in said
+    assert read_configuration(tmp_path / "my.toml").contacts.diameter is None
 
 
 def test_what_there_was_no_time_to_try_is_said(tmp_path, monkeypatch):
