@@ -17,7 +17,7 @@ from .settings import OFF
 _PAIRS = "rules for pairs of hands"
 _MOST_ANCHORS = 50_000
 _HALF_OF_NO_SPACE = 5.0
-_NEAR, _SOON = "10 nm", "1e+06 1/s"
+_NEAR, _SOON = "10 nm", "1e+04 1/s"
 """Within what, and how soon, a nucleator holds what it has made."""
 _RANGE_AND_LAW = (
     "k_on/(2 reach) exp(-U/kT) for each length within reach of a hand that is tied, which has an equilibrium; in "
