@@ -63,8 +63,8 @@ def cut_filaments(stage, current, say):
         if cuts < places:
             warnings.warn(
                 f"{text}. They stay whole where no place is free for a part (give a larger reserve), where a part "
-                "would be shorter than the shortest, or is clamped or held by a tether, and where walls or contacts leave no "
-                "room for the new ends.",
+                "would be shorter than the shortest, or is clamped or held by a tether, and where walls or contacts "
+                "leave no room for the new ends.",
                 StageWarning,
                 stacklevel=2,
             )
