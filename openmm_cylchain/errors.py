@@ -100,6 +100,10 @@ class SegmentLengthWarning(UserWarning):
     """Segments that are too long for the force that pulls them: the message says by how much the force is off."""
 
 
+class StageWarning(UserWarning):
+    """A stage of a run that does not do all that it says, such as planes that leave filaments whole."""
+
+
 class TimeStepWarning(UserWarning):
     """A time step that is too long: above a bound, which the message names, or by what a run shows of it."""
 

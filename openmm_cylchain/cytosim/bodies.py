@@ -13,6 +13,7 @@ from .filaments import add_on_body, first_length, shared_growth
 from .places import draw_inside, draw_position, region_of, unknown_position
 from .script import count_of
 from .settings import OFF, Settings
+from .simulation import STILL
 
 KINDS = ("bead", "solid", "sphere", "aster")
 _ONE_SINGLE = re.compile(r"(\d+\s+)?([A-Za-z_]\w*)\s*(.*)", re.DOTALL)
@@ -270,15 +271,22 @@ def _add_table(translation, own, new, count, shape):
     if translation.dimensions == 2:
         table.add("planar", True, Note(EXACT, "two dimensions"))
     steric = _steric_line(translation, table, settings)
-    if settings.number("viscosity", default=translation.viscosity) != translation.viscosity:
-        text = f"viscosity = {settings.text('viscosity')}, its own"
-        table.comment(Note(LEFT_OUT, text, settings.line_of("viscosity"), "bodies with a viscosity of their own"))
+    _add_viscosity(translation, table, settings)
     for key in ("point_mobility", "piston_effect"):
         settings.values(key)
     number = len(translation.document.tables_called("[[body]]"))
     made = MadeBodies(new.name, own.name, count, table, number, shape.groups, shape.singles, steric)
     translation.bodies.append(made)
     return made
+
+
+def _add_viscosity(translation, table, settings):
+    viscosity, line = settings.number("viscosity", default=translation.viscosity), settings.line_of("viscosity")
+    if viscosity <= 0.0:
+        raise settings.mistake("viscosity", "must be positive.")
+    if viscosity != translation.viscosity:
+        note = Note(NEAREST, "inf in Cytosim", line) if viscosity == math.inf else Note(EXACT, "its own", line)
+        table.add("viscosity", quantity(min(viscosity, STILL), "pN*s/um^2"), note)
 
 
 def _steric_line(translation, table, settings):

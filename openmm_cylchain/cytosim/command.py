@@ -76,8 +76,9 @@ def import_file(path, output, dimensions=None, given=None, trial=False):
         if (output.parent / name).exists():
             raise InputError(f"{output.parent / name} exists already: name another output.")
     configuration = check(translation, translation.document.text(), path)
+    untried = None
     if trial:
-        try_first_steps(
+        untried = try_first_steps(
             translation.document, configuration, lambda: check(translation, translation.document.text(), path)
         )
     text = translation.document.text()
@@ -85,7 +86,7 @@ def import_file(path, output, dimensions=None, given=None, trial=False):
         np.save(output.parent / name, positions)
     with open(output, "x", encoding="utf-8", newline="\n") as file:
         file.write(text)
-    return list(report(translation, output))
+    return list(report(translation, output, untried))
 
 
 def check(translation, text, path):
@@ -115,8 +116,8 @@ def _line_of(document, path):
     return tables[index].line if index < len(tables) else None
 
 
-def report(translation, output):
-    """Lines that say what was done."""
+def report(translation, output, untried=None):
+    """Lines that say what was done, and which of the first steps were not tried."""
     notes = translation.document.notes
     counts = {kind: [note for note in notes if note.kind == kind] for kind in (EXACT, NEAREST, LEFT_OUT)}
     files = ", ".join([str(output), *(str(output.parent / name) for name in translation.start_files)])
@@ -131,4 +132,6 @@ def report(translation, output):
     if translation.document.missing:
         yield "  missing, to say all of it:"
         yield from (f"    {needs}" for needs in translation.document.missing)
+    if untried is not None:
+        yield f"  {untried}"
     yield f"Look at it, and run it with\n    openmm-cylchain run {output} --output {output.with_suffix('')}"

@@ -9,7 +9,7 @@ from .attached import GROWING, PLACED, place_along
 from .bodies import attach_to_bodies, point_of_base
 from .document import EXACT, LEFT_OUT, NEAREST, Note, point, quantity
 from .hands import read_hand
-from .nucleation import add_nucleators
+from .nucleation import add_diffusing_nucleators, add_nucleators
 from .places import draw_inside, unknown_position
 from .script import count_of
 from .settings import OFF
@@ -17,7 +17,7 @@ from .settings import OFF
 _PAIRS = "rules for pairs of hands"
 _MOST_ANCHORS = 50_000
 _HALF_OF_NO_SPACE = 5.0
-_NEAR, _SOON = "10 nm", "1e+06 1/s"
+_NEAR, _SOON = "10 nm", "1e+04 1/s"
 """Within what, and how soon, a nucleator holds what it has made."""
 _RANGE_AND_LAW = (
     "k_on/(2 reach) exp(-U/kT) for each length within reach of a hand that is tied, which has an equilibrium; in "
@@ -204,10 +204,12 @@ def _singles(translation, own, new, linked):
     if "attach" in options or "attach1" in options:
         _attached(translation, own, new, linked, count, "attach" if "attach" in options else "attach1")
         return
+    hand = _nucleator(translation, own)
     if not fixed:
-        linked.count += count
+        if hand is None or not add_diffusing_nucleators(translation, own, new, hand.settings, count):
+            linked.count += count
         return
-    points, hand = _points(translation, new, count, len(linked.points)), _nucleator(translation, own)
+    points = _points(translation, new, count, len(linked.points))
     if hand is not None and add_nucleators(translation, new, hand.settings, points):
         linked.nucleators += points
     else:
@@ -292,6 +294,7 @@ def _single_table(translation, own, linked):
     (hand,) = _hands_of(translation, own)
     if not _binds(translation, own, [hand]):
         return
+    _let_hold(translation, own, linked, [hand])
     table = translation.document.table("[[linkers]]", own.line)
     table.add("name", own.name, Note(EXACT, f"single {own.name}", own.line))
     _add_spring(translation, table, own)
@@ -348,6 +351,7 @@ def _couple_table(translation, own, linked):
     hands = _hands_of(translation, own)
     if not _binds(translation, own, hands):
         return
+    _let_hold(translation, own, linked, hands)
     activity = settings.text("activity", default="diffuse")
     if activity in ("slide", "shackle"):
         _let_slide(translation, own, hands[0])
@@ -418,6 +422,23 @@ def _add_spring(translation, table, own):
         if own.settings.text("activity") == "bridge":
             note = Note(EXACT, "activity = bridge")
         table.add("rest_length", quantity(length, "um"), note)
+
+
+def _let_hold(translation, own, linked, hands):
+    # Cytosim attaches hands also to fibers to which they do not bind, here those that never bind.
+    for place in list(linked.places):
+        for hand, key in zip(hands, ("filament", "second_filament")):
+            types = {translation.type_name(translation.made[number].name) for number in place.get(key, ())}
+            others = sorted(types - set(hand.types))
+            if others and not hand.table["binding_rate"].startswith("0 "):
+                text = f"{own.name} attached to {', '.join(others)}, to which hand {hand.name} does not bind"
+                translation.left_out(text, own.line, PLACED)
+                linked.places.remove(place)
+                break
+            if others:
+                hand.types = [*hand.types, *others]
+                hand.table["binds_to"] = hand.types
+                hand.note(EXACT, f"it is attached to {', '.join(others)}, and never binds", own.line)
 
 
 def _add_bound(table, own, linked, hand):

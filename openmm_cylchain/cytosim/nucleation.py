@@ -64,31 +64,72 @@ def _begins(translation, new, command, rate):
 
 
 def add_nucleators(translation, new, hand, places):
-    """Add hands that make fibers, and are tied to places: whether they could be added.
+    """Add hands that make fibers at places: whether they could be added.
 
     Each of them has a [[nucleation]] of its own, of one filament at a time, as it holds one as long as that is there.
+
+    ``places`` are points in um.
     """
-    rate, name = hand.number("nucleate", default=0.0), hand.text(("nucleate", 1), default="")
-    fiber, block = translation.script.properties.get(name), hand.block("nucleate", 2)
-    stays = hand.number("unbinding_rate", "unbinding", default=0.0) == 0.0
+    name, unbinding = _made_by(translation, hand)
+    if name is None or unbinding > 0.0 or len(places) > _MOST_NUCLEATORS:
+        return False
+    positions = [[" ".join(f"{own:.9g}" for own in place)] for place in places]
+    return _add_nucleators(translation, new, hand, name, positions, 1)
+
+
+def add_diffusing_nucleators(translation, own, new, hand, count):
+    """Add a count of singles whose hands make fibers where they diffuse: whether they could be added.
+
+    One that holds what it has made has a [[nucleation]] of its own, as those at places; those that let go have one of
+    all, as often as they begin and let go on average.
+
+    ``own`` is the Property of the singles.
+    """
+    name, unbinding = _made_by(translation, hand)
+    space = translation.space(own.settings.confining_space())
+    on_surface = own.settings.text("confine") in ("on", "surface") and space is not None and not space.thin
+    if name is None or on_surface or (unbinding == 0.0 and count > _MOST_NUCLEATORS):
+        return False
+    confining = own.settings.confining_space()
+    position = new.settings.values("position") if own.settings.number("diffusion", default=0.0) == 0.0 else []
+    position = position or ["inside", *([] if confining is None else [confining])]
+    if unbinding == 0.0:
+        return _add_nucleators(translation, new, hand, name, [position] * count, 1)
+    return _add_nucleators(translation, new, hand, name, [position], None, count, unbinding)
+
+
+def _made_by(translation, hand):
+    # The name of the fiber that a hand makes, or None if it cannot be said here; and the rate at which it lets go.
+    name = hand.text(("nucleate", 1), default="")
+    fiber = translation.script.properties.get(name)
+    unbinding = hand.number("unbinding_rate", "unbinding", default=0.0)
     holds = hand.text("hold_end", "track_end", default="minus_end") == "minus_end"
-    if rate <= 0.0 or fiber is None or fiber.kind != "fiber" or not (stays and holds):
-        return False
-    if len(places) > _MOST_NUCLEATORS:
-        return False
-    note = Note(EXACT, f"nucleate = {rate:g}, of one {new.name}", hand.line_of("nucleate"))
-    for place in places:
-        options = Settings.of(f"new {name}", hand.line_of("nucleate"), block)
-        options.set("position", [" ".join(f"{own:.9g}" for own in place)], new.line)
-        if not _add_nucleation(translation, new, fiber, options, (rate, note), 1):
+    rate = hand.number("nucleate", default=0.0)
+    if rate <= 0.0 or fiber is None or fiber.kind != "fiber" or not holds or hand.flag("addictive", default=False):
+        return None, unbinding
+    return name, unbinding
+
+
+def _add_nucleators(translation, new, hand, name, positions, places, count=1, unbinding=0.0):
+    # One [[nucleation]] for each position, of so many hands that let go at a rate.
+    rate, line = hand.number("nucleate"), hand.line_of("nucleate")
+    fiber, block = translation.script.properties[name], hand.block("nucleate", 2)
+    note = Note(EXACT, f"nucleate = {rate:g}, of one {new.name}", line)
+    if unbinding > 0.0:
+        text = f"of {count} {new.name}, each of which makes one at nucleate = {rate:g} and lets go at {unbinding:g}"
+        rate, note = count / (1.0 / rate + 1.0 / unbinding), Note(NEAREST, text, line)
+    for position in positions:
+        options = Settings.of(f"new {name}", line, block)
+        options.set("position", position, new.line)
+        if not _add_nucleation(translation, new, fiber, options, (rate, note), places, "minus_end"):
             return False
     for key in ("activity", "binding_rate", "binding", "binding_range", "unbinding_force", "nucleate"):
         hand.values(key)
     return True
 
 
-def _add_nucleation(translation, new, fiber, options, rate, places=None):
-    # Whether it could be added; ``places`` of filaments, or as many as begin.
+def _add_nucleation(translation, new, fiber, options, rate, places=None, reference="center"):
+    # Whether it could be added; ``places`` of filaments, or as many as begin; what of a fiber is at its position.
     growing = shared_growth(translation, fiber, options, begins=True)
     space = translation.space(options.text(("position", 1)))
     draw = translation.draw_in(space, options.line)
@@ -120,7 +161,9 @@ def _add_nucleation(translation, new, fiber, options, rate, places=None):
         )
         table.add("total_rate", quantity(share, "1/s"), note)
         if region is not None:
-            where = Note(NEAREST, "where the first node is; in Cytosim, the middle") if not places else Note(EXACT, "")
+            where = Note(EXACT, "")
+            if reference == "center":
+                where = Note(NEAREST, "where the first node is; in Cytosim, the middle")
             table.add("inside", region, where)
         if fixed is not None:
             note_of_two = Note(EXACT, "half of them have the opposite direction" if len(signs) > 1 else "")

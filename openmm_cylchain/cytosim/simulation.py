@@ -11,7 +11,7 @@ _BOLTZMANN = 1.380649e-5
 _COLDEST = 1e-3
 _USUAL_FRAMES, _USUAL_FRAMES_OF_STAGE = 100, 10
 _MOST_STEPS_PER_FRAME = 10**7
-_STILL = 1e8
+STILL = 1e8
 """In pN s/um^2: a viscosity in which fibers stand still."""
 _NOT_SOLVED = ("off", "0")
 
@@ -40,7 +40,7 @@ def add_solvent(translation):
     run = translation.script.run
     if run is not None and run.text("solve", default="on") in _NOT_SOLVED:
         note = Note(NEAREST, f"solve = off: fibers stand still in it, and not in {viscosity:g}", run.line_of("solve"))
-        viscosity = max(viscosity, _STILL)
+        viscosity = max(viscosity, STILL)
     table.add("viscosity", quantity(viscosity, "pN*s/um^2"), note)
     flow = simul.vector("flow")
     if flow is not None and any(flow):

@@ -23,6 +23,8 @@ _NAMES = {
 }
 _FLAT = 1.0
 """Half the thickness in um of walls and regions around a plane, in which nothing is at another height."""
+_THIN = 1e-4
+"""Half of a width in um that is zero in Cytosim: of planes, lines and points."""
 _DRAWS = 100_000
 
 
@@ -31,7 +33,8 @@ class Space:
     """A space: ``inside(points)`` says which of (n, 3) points are in it, ``half`` are the halves of its box.
 
     ``walls`` are tables of [[wall]] without stiffness, None if none of ours is that shape; ``region`` is where things
-    begin, None if there is none; ``edges`` are those of a periodic box, of which None does not repeat.
+    begin, None if there is none; ``edges`` are those of a periodic box, of which None does not repeat. It is ``thin``
+    if it is a plane, a line or a point, all of which is its surface.
     """
 
     shape: str
@@ -43,6 +46,7 @@ class Space:
     region: dict | None = None
     edges: tuple | None = None
     middle: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    thin: bool = False
 
     def draw(self, generator):
         """A random point in it, or None if none is found."""
@@ -70,12 +74,16 @@ def make_space(shape, settings, dimensions, folder="."):
         shape = {"cylinder": "square", "cylinderP": "strip"}.get(shape, shape)
     if shape not in SHAPES:
         return None
-    return SHAPES[shape](_Sizes(settings, Path(folder)), dimensions)
+    sizes = _Sizes(settings, Path(folder))
+    space = SHAPES[shape](sizes, dimensions)
+    if space is not None:
+        space.thin = sizes.thin
+    return space
 
 
 class _Sizes:
     def __init__(self, settings, folder):
-        self._settings, self._folder = settings, folder
+        self._settings, self._folder, self.thin = settings, folder, False
 
     def number(self, *places, default=None):
         for settings in self._settings:
@@ -86,11 +94,18 @@ class _Sizes:
 
     def radius(self):
         diameter = self.number("diameter", "width")
-        return self.number("radius") if diameter is None else 0.5 * diameter
+        return self.wide(self.number("radius") if diameter is None else 0.5 * diameter)
 
     def halves(self, count):
         lengths = [self.number(("length", axis)) for axis in range(count)]
-        return None if None in lengths else [0.5 * length for length in lengths]
+        return None if None in lengths else [self.wide(0.5 * length) for length in lengths]
+
+    def wide(self, half):
+        """Half of a width, which is not zero."""
+        if half != 0.0:
+            return half
+        self.thin = True
+        return _THIN
 
     @property
     def corners(self):
@@ -116,8 +131,12 @@ class _Sizes:
     def ends(self, index=0):
         length = self.number(("length", index))
         if length is not None:
-            return -0.5 * length, 0.5 * length
-        return self.number("bottom"), self.number("top")
+            bottom, top = -0.5 * length, 0.5 * length
+        else:
+            bottom, top = self.number("bottom"), self.number("top")
+        if bottom is None or bottom != top:
+            return bottom, top
+        return bottom - self.wide(0.0), top + self.wide(0.0)
 
 
 def _flat(half, dimensions):
@@ -151,7 +170,7 @@ def disc_region(radius, thickness=2 * _FLAT, center=(0.0, 0.0, 0.0), axis=(0, 0,
 def _square(sizes, dimensions):
     half = sizes.halves(1)
     others = [sizes.number(("length", axis)) for axis in range(1, dimensions)]
-    others = [sizes.radius() if own is None else 0.5 * own for own in others]
+    others = [sizes.radius() if own is None else sizes.wide(0.5 * own) for own in others]
     if half is None or None in others or min(half + others) <= 0.0:
         return None
     half = _flat([*half, *others], dimensions)
@@ -228,6 +247,20 @@ def _cylinder(sizes, dimensions, axis=0):
     sizes_of_box = along * half + (1.0 - along) * radius
     volume = 2 * math.pi * radius**2 * half
     return Space("cylinder", sizes_of_box, inside, volume, surface, walls, region, middle=middle)
+
+
+def _bicylinder(sizes, dimensions):
+    # Where two cylinders along x and y cross.
+    radius = sizes.radius()
+    if not radius or dimensions == 2:
+        return None
+
+    def inside(at):
+        return np.maximum(at[..., 0] ** 2, at[..., 1] ** 2) + at[..., 2] ** 2 <= radius**2
+
+    size = quantity(radius, "um")
+    walls = [{"shape": "cylinder", "axis": axis, "radius": size} for axis in ([1, 0, 0], [0, 1, 0])]
+    return Space("bicylinder", np.full(3, radius), inside, 16.0 / 3.0 * radius**3, 16.0 * radius**2, walls)
 
 
 def _cylinder_periodic(sizes, dimensions):
@@ -369,6 +402,7 @@ SHAPES = {
     "cylinderZ": lambda sizes, dimensions: _cylinder(sizes, dimensions, 2),
     "disc": lambda sizes, dimensions: _sphere(sizes, 2) if dimensions == 2 else _cylinder(sizes, dimensions, 2),
     "cylinderP": _cylinder_periodic,
+    "bicylinder": _bicylinder,
     "periodic": _periodic,
     "strip": _strip,
     "annulus": _annular,

@@ -8,6 +8,7 @@ import numpy as np
 from ..errors import InputError
 from .bodies import KINDS as BODY_KINDS
 from .bodies import add_bodies
+from .bundles import add_bundles
 from .document import LEFT_OUT, NEAREST, Document, point
 from .drawing import Draw
 from .filaments import add_filaments
@@ -31,7 +32,6 @@ from .walls import add_walls
 _BODIES = {
     "nucleus": "bodies: nuclei",
     "fake": "bodies: spindles (fake)",
-    "bundle": "bundles of fibers",
     "organizer": "bodies: organizers",
     "field": "fields",
 }
@@ -206,6 +206,8 @@ class Translation:
                 add_event(self, new)
             elif new.kind in BODY_KINDS:
                 add_bodies(self, new)
+            elif new.kind == "bundle":
+                add_bundles(self, new)
             elif new.kind in _BODIES:
                 new.settings.take_rest()
                 if count_of(new, self.space()):
@@ -241,6 +243,8 @@ class Translation:
             if space is not None and still != shape:
                 own.settings.take_rest()
                 self.left_out(f"forces on {new.name}, which keeps its shape", new.line, f"spaces: {shape}")
+            if space is not None and space.thin:
+                self.document.note(NEAREST, f"{new.name} has a thickness of 0.2 nm, and none in Cytosim", new.line)
             if new.name not in self._spaces:
                 self._spaces[new.name] = space
             if space is None:

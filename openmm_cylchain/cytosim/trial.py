@@ -1,19 +1,30 @@
-"""The first steps of what is written: where they have no solution at the time step of Cytosim, in shorter ones."""
+"""The first steps of what is written: where they have no solution at the time step of Cytosim, in shorter ones.
+
+Where even these have none, without contacts: those of Cytosim let filaments through each other.
+"""
 
 import contextlib
 import io
 import time
 import warnings
 
+from openmm import OpenMMException
+
 from ..errors import InputError, InstabilityError
 from .document import LEFT_OUT, NEAREST, Note, number_in, quantity
 
-_STEPS, _MOST_SECONDS = 100, 10.0
+_STEPS, _OF_STAGE, _MOST_SECONDS = 10_000, 100, 6.0
+"""Of a run at most, of each stage before it is said to be slow, and seconds of these at most."""
+_SHOWN = 5
+_NEEDS = "starts from which steps can be taken"
 _PARTS = (2, 5, 10, 20, 50, 100)
 
 
 def try_first_steps(document, configuration, configuration_of):
     """Divide the time steps of a Document until its run takes its first steps, and say so where that was needed.
+
+    As what follows may need shorter ones by chance, the next shorter one is taken after the longest that will do.
+    Contacts are turned off where that is of no help.
 
     Parameters
     ----------
@@ -22,21 +33,41 @@ def try_first_steps(document, configuration, configuration_of):
         Of what it says.
     configuration_of : callable ()
         That of what it says after a change.
+
+    Returns
+    -------
+    str or None
+        That they could not all be tried.
     """
-    trouble = _trouble(configuration)
+    trouble, unknown = _trouble(configuration)
     if trouble is None:
-        return
+        return unknown
     tables = [own for own in document.tables if own.header in ("[simulation]", "[stage.simulation]")]
     whole = [(table, list(table.entries)) for table in tables]
+    will_do = False
     for parts in _PARTS:
         for table, entries in whole:
             table.entries = [_divided(entry, parts) for entry in entries]
-        if _trouble(configuration_of()) is None:
-            return
+        still, unknown = _trouble(configuration_of())
+        if still is None and (will_do or unknown or parts == _PARTS[-1]):
+            return unknown
+        will_do = still is None
     for table, entries in whole:
         table.entries = entries
-    text = f"a start from which steps can be taken, however short: {trouble}"
-    document.note(LEFT_OUT, text, None, "starts from which steps can be taken")
+    touching = [own for own in document.tables if own.header in ("[contacts]", "[stage.contacts]")]
+    whole = [(table, list(table.entries)) for table in touching]
+    for table in touching:
+        text = f"contacts, with which the first steps have no solution, however short: {trouble}"
+        table.entries = [entry for entry in table.entries if entry[0] != "active"]
+        table.add("active", False, Note(LEFT_OUT, text, None, _NEEDS))
+    if touching:
+        still, unknown = _trouble(configuration_of())
+        if still is None:
+            return unknown
+    for table, entries in whole:
+        table.entries = entries
+    document.note(LEFT_OUT, f"a start from which steps can be taken, however short: {trouble}", None, _NEEDS)
+    return None
 
 
 def _divided(entry, parts):
@@ -48,16 +79,16 @@ def _divided(entry, parts):
 
 
 def _trouble(configuration):
-    # Why a run does not take its first steps, in a sentence; None if it does, or if they take too long to know.
+    # Why a run does not take its first steps, or None; and what there was no time to know, or None: sentences.
     from ..runs.created_simulation import create_simulation
-    from ..runs.dry_run import take_first_steps
+    from ..runs.dry_run import STEPS_OF_STAGE, take_first_steps
     from ..runs.relaxation import relaxed_positions
     from ..runs.stages import stages_of
 
-    start = time.process_time()
+    start, longest, slow = time.process_time(), 2.0 * _MOST_SECONDS, []
 
-    def stop(_):
-        if time.process_time() - start > _MOST_SECONDS:
+    def stop():
+        if time.process_time() - start > longest:
             raise _TooLongError
 
     try:
@@ -65,15 +96,25 @@ def _trouble(configuration):
             # The run itself warns.
             warnings.simplefilter("ignore")
             stages = stages_of(configuration)
-            simulation, built = create_simulation(stages[0].configuration)
-            simulation.context.setPositions(relaxed_positions(stages[0].configuration, built, stop))
-            for _ in take_first_steps(stages, (simulation, built), _STEPS, _MOST_SECONDS):
-                pass
-    except (InputError, InstabilityError) as error:
-        return str(error)
+            first = stages[0].configuration
+            simulation, built = create_simulation(first)
+            positions = relaxed_positions(first, built, lambda _: None, stop)
+            # What comes in later stages meets what has hardly moved in a dry run.
+            counts = [max(_OF_STAGE, _STEPS // len(stages)), *([STEPS_OF_STAGE] if len(stages) > 1 else [])]
+            for count in counts:
+                simulation.context.reinitialize()
+                simulation.context.setPositions(positions)
+                for stage, taken in take_first_steps(stages, (simulation, built), count, _MOST_SECONDS, stop):
+                    if taken is not None and taken < min(_OF_STAGE, count, stage.configuration.simulation.steps):
+                        slow.append(stage.name or "the run")
+    except (InputError, InstabilityError, OpenMMException) as error:
+        return str(error), None
     except _TooLongError:
-        pass
-    return None
+        return None, f"Its filaments overlap, and do not come apart within {longest:g} s: it may not run."
+    if slow:
+        names = ", ".join(list(dict.fromkeys(slow))[:_SHOWN])
+        return None, f"Not all of the first steps were tried, since they are slow: {names}."
+    return None, None
 
 
 class _TooLongError(Exception):

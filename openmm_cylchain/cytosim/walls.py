@@ -109,6 +109,9 @@ def _add_wall(translation, own, whole, held, every):
         shape = translation.shape_name(own.space)
         translation.left_out(f"the wall of the shape {shape}", line, f"walls: {shape}")
         return
+    if space.thin and own.side == "surface":
+        # Within it is on it.
+        own = own._replace(side="inside")
     curved = [wall for wall in space.walls if wall["shape"] in _ONE_FACE]
     if own.side != "inside" and len(curved) != 1:
         what = "what is on the surface" if own.side == "surface" else "what is outside"
@@ -120,7 +123,7 @@ def _add_wall(translation, own, whole, held, every):
         for key, value in wall.items():
             table.add(key, value, Note(EXACT, f"confine, {own.stiffness:g}" if key == "shape" else "", line))
         table.add("stiffness", quantity(own.stiffness, "pN/um"), Note(EXACT, "of each node"))
-        if wall["shape"] == "prism":
+        if wall["shape"] == "prism" or space.shape == "bicylinder":
             table.comment(Note(NEAREST, "what is beyond a corner is pushed by both sides, each by its own distance"))
         if side != "inside":
             table.add("side", side)

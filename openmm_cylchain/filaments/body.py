@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..mechanics.friction import rotational_friction_of_sphere, stokes_friction
-from ..units.quantities import LENGTH, in_units_of, positive, require_kind, shown, vector
+from ..units.quantities import LENGTH, VISCOSITY, in_units_of, positive, require_kind, shown, vector
 from ..units.types import FloatArray, Numbers, Scalar, Vector, Vectors
 
 BODY_NAME = "BOD"
@@ -39,6 +39,9 @@ class Body:
         Zero for points that are places alone, without friction; one at least must not be.
     name : str
         Of the body, in its label and in the Topology.
+    viscosity : viscosity, optional
+        The eta of its friction where that is not the one of the solvent: of what it moves in, such as a cortex. Its
+        noise belongs to this friction.
 
     Notes
     -----
@@ -54,9 +57,10 @@ class Body:
     points: FloatArray
     radii: FloatArray
     name: str = "Body"
+    viscosity: float | None = None
     _markers: int = 0
 
-    def __init__(self, points: Vectors, radii: Numbers, name: str = "Body") -> None:
+    def __init__(self, points: Vectors, radii: Numbers, name: str = "Body", viscosity: Scalar | None = None) -> None:
         if not isinstance(name, str) or not name:
             raise InputError(f"The name of a Body must be a text, but is {shown(name)}.")
         label = f"{name}:"
@@ -76,11 +80,13 @@ class Body:
         object.__setattr__(self, "points", np.concatenate([places, markers]))
         object.__setattr__(self, "radii", np.concatenate([sizes, np.zeros(len(markers))]))
         object.__setattr__(self, "name", name)
+        own = None if viscosity is None else positive(viscosity, VISCOSITY, f"{label} viscosity")
+        object.__setattr__(self, "viscosity", own)
         object.__setattr__(self, "_markers", len(markers))
         self.points.flags.writeable = self.radii.flags.writeable = False
 
     @classmethod
-    def sphere(cls, radius: Scalar, points: Vectors = (), name: str = "Body") -> Body:
+    def sphere(cls, radius: Scalar, points: Vectors = (), name: str = "Body", viscosity: Scalar | None = None) -> Body:
         """A sphere about the origin, with places on it or in it.
 
         Parameters
@@ -89,6 +95,7 @@ class Body:
         points : (n, 3) lengths
             Places for links and hands; their numbers in the body are 1 to n, and 0 is the centre.
         name : str
+        viscosity : viscosity, optional
         """
         size = positive(radius, LENGTH, f"{name}: radius")
         places = np.asarray(in_units_of(points, LENGTH, f"{name}: points"), dtype=float)
@@ -96,7 +103,7 @@ class Body:
             places = np.zeros((0, 3))
         if places.ndim != 2 or places.shape[1] != 3:
             raise InputError(f"{name}: points must have the shape (n, 3), but have {places.shape}.")
-        return cls(np.concatenate([np.zeros((1, 3)), places]), np.r_[size, np.zeros(len(places))], name)
+        return cls(np.concatenate([np.zeros((1, 3)), places]), np.r_[size, np.zeros(len(places))], name, viscosity)
 
     @property
     def has_places(self) -> bool:
@@ -110,11 +117,13 @@ class Body:
         return self.radii @ self.points / self.radii.sum()
 
     def friction(self, viscosity: Scalar) -> float:
-        """The friction against motion, in kJ ps/(mol nm^2)."""
+        """The friction against motion in a solvent, in kJ ps/(mol nm^2)."""
+        viscosity = self._viscosity_in(viscosity)
         return float(sum(stokes_friction(2.0 * radius, viscosity) for radius in self.radii if radius > 0.0))
 
     def rotational_friction(self, viscosity: Scalar) -> FloatArray:
         """The friction against turning about the centre of friction: (3, 3), in kJ ps/mol."""
+        viscosity = self._viscosity_in(viscosity)
         result = np.zeros((3, 3))
         for radius, arm in zip(self.radii, self.points - self.centre):
             if radius > 0.0:
@@ -122,6 +131,9 @@ class Body:
                 result += rotational_friction_of_sphere(2.0 * radius, viscosity) * np.eye(3)
                 result += stokes_friction(2.0 * radius, viscosity) * across
         return result
+
+    def _viscosity_in(self, viscosity):
+        return viscosity if self.viscosity is None else self.viscosity
 
     def place_frictions(self, viscosity: Scalar) -> FloatArray:
         """The least friction that each point has against motion of its own, in kJ ps/(mol nm^2): (n,)."""

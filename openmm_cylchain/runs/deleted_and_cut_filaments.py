@@ -1,8 +1,11 @@
 """Filaments that a stage deletes or cuts as it begins: which ones, and what can hold none of them."""
 
+import warnings
+
 import numpy as np
 from openmm import unit
 
+from ..errors import StageWarning
 from ..systems.described_runs import growth_in
 
 _SEED = 7
@@ -40,17 +43,31 @@ def deleted_filaments(stage, current, seed):
     return frozenset(gone)
 
 
-def cut_filaments(stage, current):
+def cut_filaments(stage, current, say):
     """Cut filaments in the Simulation of a Stage and its BuiltSystem, as it begins, by the planes that it has.
 
-    They are those of a table, with the parts of these and those that have begun by nucleation.
+    They are those of a table, with the parts of these and those that have begun by nucleation. ``say`` is told at how
+    many places. Warns where some stay whole.
     """
     tables = {} if stage.is_piece else {own.table: own.cuts for own in stage.configuration.filaments if own.cuts}
     simulation, built = current
     members = _numbers_of_tables(stage.configuration)
     for table, planes in tables.items():
-        for plane in planes:
-            built.filaments.in_context(simulation.context).cut(plane, members[table])
+        in_context = built.filaments.in_context(simulation.context)
+        places, cuts = np.sum([in_context.cut(plane, members[table]) for plane in planes], axis=0)
+        text = (
+            f"{stage.name}: filaments of [[filament]] number {table} are cut at {cuts} of the {places} places at which "
+            "they go through its planes"
+        )
+        say(f"{text}.")
+        if cuts < places:
+            warnings.warn(
+                f"{text}. They stay whole where no place is free for a part (give a larger reserve), where a part "
+                "would be shorter than the shortest, or is clamped or held by a tether, and where walls or contacts "
+                "leave no room for the new ends.",
+                StageWarning,
+                stacklevel=2,
+            )
 
 
 def _numbers_of_tables(configuration):

@@ -22,7 +22,7 @@ from .summary import group_labels, group_members
 
 _MEASURED_SECONDS = 3.0
 _PER_SECOND, _PER_SECOND_AND_UM = 1e12, 1e15
-_STEPS_OF_STAGE = 2
+STEPS_OF_STAGE = 2
 _BYTES_OF_NUMBER = 20
 """Of a number in a table, with its comma."""
 
@@ -125,7 +125,7 @@ def _stages(stages, current):
     # In turn, with a few steps of each, which is to say that each can be begun.
     yield "  stages, each of which takes its first steps:"
     lasts = {stage.number: last for stage, last in named_stages(stages)}
-    for stage in take_first_steps(stages, current, _STEPS_OF_STAGE):
+    for stage, _ in take_first_steps(stages, current, STEPS_OF_STAGE):
         if not stage.is_piece:
             last = lasts[stage.number]
             count = last.number - stage.number + 1
@@ -133,24 +133,29 @@ def _stages(stages, current):
             yield f"    {stage.name}: from {format_time(stage.begin)} to {format_time(last.end)}{divided}"
 
 
-def take_first_steps(stages, current, count, most_seconds=float("inf")):
-    """Take a count of steps of each stage in turn, or fewer where they take long; each Stage before its steps.
+def take_first_steps(stages, current, count, most_seconds=float("inf"), stop=None):
+    """Take a count of steps of each stage in turn, or fewer where they take long: each Stage, and how many were taken.
 
-    ``current`` are the Simulation and the BuiltSystem of the first one, where it begins. InputError and
-    InstabilityError as in a run.
+    ``current`` are the Simulation and the BuiltSystem of the first one, where it begins. Each stage has an equal share
+    of the seconds of processors that are left, and one that comes again takes none: None. ``stop`` is called after each
+    step between stages. InputError and InstabilityError as in a run.
     """
     first, known, start = current, set(), time.process_time()
-    for stage in stages:
-        yield stage
-        if id(stage.configuration) in known:
-            continue
-        known.add(id(stage.configuration))
-        with naming_stage(stage), located_instability(stage.configuration), steps():
-            if stage.number:
-                current = following_simulation(current, stage, first, stages[0].configuration.simulation.seed)
-            for _ in range(min(count, stage.configuration.simulation.steps)):
-                if time.process_time() - start < most_seconds:
+    for place, stage in enumerate(stages):
+        taken = None
+        if id(stage.configuration) not in known:
+            known.add(id(stage.configuration))
+            with naming_stage(stage), located_instability(stage.configuration), steps():
+                if stage.number:
+                    seed = stages[0].configuration.simulation.seed
+                    current = following_simulation(current, stage, first, seed, stop=stop)
+                now = time.process_time()
+                end = now + (start + most_seconds - now) / (len(stages) - place)
+                taken = 0
+                while taken < min(count, stage.configuration.simulation.steps) and time.process_time() < end:
                     current[0].step(1)
+                    taken += 1
+        yield stage, taken
 
 
 def _cost(configuration, stages, simulation, built):

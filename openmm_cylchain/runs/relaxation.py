@@ -1,5 +1,6 @@
 """Filaments that are drawn on top of each other come apart before a run begins."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -22,10 +23,12 @@ _MOST_SHIFTS, _SHIFT = 3, 0.1
 """How often a filament is shifted that does not come apart, and how far along each axis, in diameters of contacts."""
 _LEAST_CHANCE, _MOST_ROUNDS = 3e-4, 100
 """Of the deepest contact, or as many steps follow again; and how often."""
+_FULLEST = math.pi / math.sqrt(12.0)
+"""Share of a box that cylinders fill at most."""
 _ALL_STEPS = _STEPS * (len(_COLD) + len(_WARM))
 
 
-def relaxed_positions(configuration, built, say=None):
+def relaxed_positions(configuration, built, say=None, stop=None):
     """Positions in which a run begins: those of a BuiltSystem, or where contacts have pushed what overlapped.
 
     Linkers that begin bound near anchors are bound then, which a Context has that is made or initialised later.
@@ -38,6 +41,8 @@ def relaxed_positions(configuration, built, say=None):
     built : BuiltSystem
     say : callable (str), optional
         Told how far it is where it takes longer than two seconds; lines of standard error if not given.
+    stop : callable (), optional
+        Called after each step; what it raises ends the relaxation.
 
     Raises
     ------
@@ -47,10 +52,10 @@ def relaxed_positions(configuration, built, say=None):
     if not configuration.relaxes:
         return built.positions
     if say is not None:
-        return _begun(configuration, built, _progress(say))
+        return _begun(configuration, built, _progress(say), stop)
     messages = ProgressMessages()
     try:
-        return _begun(configuration, built, _progress(messages))
+        return _begun(configuration, built, _progress(messages), stop)
     finally:
         messages.finish()
 
@@ -59,8 +64,8 @@ def _progress(say):
     return LateMessages(say, "filaments that overlap come apart before the first step: {} of {} steps", _ALL_STEPS)
 
 
-def _begun(configuration, built, progress):
-    positions = _come_apart(configuration, built.positions, progress)
+def _begun(configuration, built, progress, stop):
+    positions = _come_apart(configuration, built.positions, progress, stop)
     if any(own.bound and own.anchors is not None for own in configuration.linkers):
         _bind_linkers(configuration, built, positions._value)
     return positions
@@ -85,21 +90,24 @@ def _bind_linkers(configuration, built, positions):
     place_linkers(find_binding_force(built.system), linkers, moved, filaments.temperature, positions, box)
 
 
-def relaxed_again(configuration, begun, positions, deleted):
+def relaxed_again(configuration, begun, positions, deleted, stop=None):
     """Positions in the midst of a run, as a quantity, where filaments that have come may overlap with others.
 
-    ``begun`` are Filaments whose initial places are those of the run, ``deleted`` the numbers of those that have gone.
+    ``begun`` are Filaments whose initial places are those of the run, ``deleted`` the numbers of those that have gone;
+    ``stop`` is called after each step.
     """
     messages = ProgressMessages()
     try:
-        return _come_apart(configuration, positions, _progress(messages), begun, deleted)
+        return _come_apart(configuration, positions, _progress(messages), stop, begun, deleted)
     finally:
         messages.finish()
 
 
-def _come_apart(configuration, positions, progress, begun=None, deleted=frozenset()):
+def _come_apart(configuration, positions, progress, stop, begun=None, deleted=frozenset()):
+    stop = stop or (lambda: None)
     settings, temperature = configuration.simulation, configuration.solvent.temperature
     alone = build_system(configuration, settings.engine, settings.seed, kinetics=False, begun=begun, deleted=deleted)
+    _refuse_if_full(configuration, alone.filaments)
     recommended = alone.filaments.recommended_time_step(settings.scheme, system=alone.system, **alone.arguments())
     longest = min(settings.time_step, recommended.step)
     integrator = alone.filaments.create_integrator(
@@ -125,12 +133,14 @@ def _come_apart(configuration, positions, progress, begun=None, deleted=frozense
                     integrator.setStepSize(length * longest)
                     for _ in range(_STEPS):
                         integrator.step(1)
+                        stop()
                         if shift == 0:
                             progress.one_is_done()
             integrator.setStepSize(recommended.step)
             rounds = 0
             while rounds < _MOST_ROUNDS and _chance_of_deepest(context, temperature) < _LEAST_CHANCE:
                 integrator.step(_STEPS)
+                stop()
                 rounds += 1
             return context.getState(positions=True).getPositions(asNumpy=True)
         except (InstabilityError, OpenMMException) as error:
@@ -142,6 +152,23 @@ def _come_apart(configuration, positions, progress, begun=None, deleted=frozense
                 ) from None
         positions = _shifted(positions, alone.filaments, number, configuration.contacts.diameter, settings.seed, shift)
     return positions
+
+
+def _refuse_if_full(configuration, filaments):
+    diameter = configuration.contacts.diameter
+    if configuration.box is None or diameter is None:
+        # Of bodies alone.
+        return
+    there = [own for own in filaments if own.takes_part]
+    length = sum(float(np.linalg.norm(np.diff(own.positions, axis=0), axis=1).sum()) for own in there)
+    share, most = length * math.pi * diameter**2 / 4.0 / math.prod(configuration.box), _FULLEST
+    if all(own.planar for own in there):
+        share, most = length * diameter / math.prod(configuration.box[:2]), 1.0
+    if share > most:
+        raise InputError(
+            f"[contacts] filaments with a diameter of {diameter:g} nm would fill {100 * share:.0f} % of the box, in "
+            "which they cannot come apart. Begin with fewer filaments or with a smaller diameter, or set relax = false."
+        )
 
 
 def _chance_of_deepest(context, temperature):

@@ -133,7 +133,7 @@ def _run_stages(stages, stage, first, current, directory, checkpoint, signals, p
             return
         stage = stages[stage.number + 1]
         with naming_stage(stage):
-            current = following_simulation(current, stage, first, seed)
+            current = following_simulation(current, stage, first, seed, print)
         _write_crosslinks(directory, current[0], stages, stage.first_step)
 
 

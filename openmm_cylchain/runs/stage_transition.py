@@ -15,7 +15,7 @@ from .relaxation import relaxed_again
 from .tables.linkers import KEPT
 
 
-def following_simulation(before, stage, first, seed):
+def following_simulation(before, stage, first, seed, say=lambda message: None, stop=None):
     """The Simulation of a stage, in the state in which that before has ended, and its BuiltSystem.
 
     Parameters
@@ -26,6 +26,15 @@ def following_simulation(before, stage, first, seed):
         The later one.
     seed : int
         By which linkers and filaments are chosen that are taken away.
+    say : callable (str), optional
+        Told at how many places planes cut filaments.
+    stop : callable (), optional
+        Called after each step in which filaments that have come push others apart.
+
+    Warns
+    -----
+    StageWarning
+        If filaments stay whole that go through planes which cut them.
 
     Raises
     ------
@@ -53,8 +62,8 @@ def following_simulation(before, stage, first, seed):
     have_come = any(own.takes_part and not other.takes_part for other, own in pairs)
     if have_come and stage.configuration.relaxes and all(own.growth is None for own in built.filaments):
         positions = new.context.getState(positions=True).getPositions(asNumpy=True)
-        new.context.setPositions(relaxed_again(stage.configuration, built.filaments, positions, built.deleted))
-    cut_filaments(stage, (new, built))
+        new.context.setPositions(relaxed_again(stage.configuration, built.filaments, positions, built.deleted, stop))
+    cut_filaments(stage, (new, built), say)
     return new, built
 
 

@@ -112,7 +112,8 @@ class FilamentsInContext:
         A cut is between the two monomers that are nearest, and both parts are filaments then, with new ends as
         ``Growth.severing`` says, in the places that ``Filaments.add_reserve`` has added. What is bound stays where it
         is. A filament stays whole where there is no place for a part, where a part would be shorter than the
-        ``shortest``, unless filaments vanish, and where what is cut off would be clamped or held by a tether.
+        ``shortest``, unless filaments vanish, where what is cut off would be clamped or held by a tether, and where
+        walls, contacts or linkers refuse a hundred new ends that are drawn.
 
         Parameters
         ----------

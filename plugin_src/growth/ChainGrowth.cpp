@@ -42,10 +42,15 @@ GrowthChanges ChainGrowth::advance(GrowthState& state, const GrowthStep& step, C
     ChainsInStep present(system, step, chains, positions, around);
     for (size_t i = 0; i < groups.size(); i++)
         groups[i].random = RandomNumbers({step.seed, 0, state.steps}, GROWTH, i);
-    if (step.plane != nullptr)
+    if (step.plane != nullptr) {
+        // A part of a chain, whose new end is drawn, may be on both sides of the plane.
+        vector<int> cut;
         for (int index : step.plane->chains)
             if (state.ranges[index].size() > 0)
-                population.cutByPlane(state, step, index, groups[groupOf[index]].random, present, changes);
+                cut.push_back(index);
+        for (int index : cut)
+            population.cutByPlane(state, step, index, groups[groupOf[index]].random, present, changes);
+    }
     // A chain that begins in this step takes its turn from then on.
     vector<char> isPresent(system.chains.size());
     for (size_t i = 0; i < isPresent.size(); i++)

@@ -181,6 +181,17 @@ def test_solids_have_points_radii_and_singles(tmp_path):
     )
 
 
+@pytest.mark.parametrize(("given", "drag"), [("20", 20.0), ("inf", 1e8)])
+def test_bodies_have_viscosities_of_their_own(tmp_path, given, drag):
+    text = f"set bead ball {{ viscosity = {given} }}\nset bead other {{ }}\nnew ball {{ radius = 0.2 }}\n"
+    found, document = translated(tmp_path, text + "new other { radius = 0.2 }\n")
+    frictions = [own.body.friction(found.solvent.viscosity) for own in found.bodies]
+    # 6 pi viscosity radius, in Pa s and m.
+    assert frictions[1] == pytest.approx(6 * np.pi * 0.1 * 0.2e-6 * 6.02214076e14, rel=1e-6)
+    assert frictions[0] / frictions[1] == pytest.approx(drag / 0.1)
+    assert document.missing == []
+
+
 def test_beads_and_spheres(tmp_path):
     text = """set bead grain { confine = all_inside, 100 }
     new 10 grain { radius = 0.25; attach = 3 motor }

@@ -204,6 +204,35 @@ new event { delay = 0.1; code = ( new rod { length = 0.5 } ) }
 run 100 system { nb_frames = 2 }
 """
 
+NUCLEATED = """
+set simul system { time_step = 0.002; viscosity = 0.5; steric = 1, 200; dim = 3 }
+set space cell { shape = semi_periodic }
+set space floor { shape = strip }
+set space rail { shape = rectangle }
+set space pin { shape = sphere }
+new cell { length = 8, 6; bottom = 0; top = 2 }
+new floor { length = 8, 6; bottom = 0; top = 0 }
+new rail { length = 6, 0, 0 }
+new pin { radius = 0 }
+set fiber tube { rigidity = 20; segmentation = 0.5; activity = grow; growing_speed = 0.2; confine = on, 50, floor
+ confine2 = inside, 100, cell; steric = 1, 0.03 }
+set hand maker { unbinding = 0, 3; activity = nucleate; nucleate = 4, tube, ( length = 0.2; plus_end = grow ) }
+set hand other { unbinding = 2; activity = nucleate; nucleate = 4, tube, ( length = 0.2; direction = X ) }
+set single seed { hand = maker; diffusion = 1; confine = on,, floor }
+set single again { hand = other; diffusion = 2 }
+set single held { hand = maker; activity = fixed; stiffness = 500 }
+set bead ball { viscosity = 20; confine = on, 200, rail }
+set solid core { viscosity = inf; confine = point, 100, pin }
+new 6 seed
+new 3 again { position = 0 0 1 }
+new 2 held { position = rectangle 2 2 at 0 0 1 }
+new 2 ball { radius = 0.3 }
+new core { point1 = 0 0 0, 0.2 }
+run 100 system { nb_frames = 2 }
+change ball { viscosity = 2 }
+run 100 system { nb_frames = 2 }
+"""
+
 PIECES = (
     "{",
     "}",
@@ -228,10 +257,13 @@ PIECES = (
 )
 
 
+TEXTS = (NETWORK, GROWING, SHAPES, STAGED, PLACED, NUCLEATED)
+
+
 def mutated(generator):
     """One of the texts with some of its pieces changed, and words of others in their place."""
-    text = (NETWORK, GROWING, SHAPES, STAGED, PLACED)[generator.integers(5)]
-    words = re.split(r"(\s+)", NETWORK + GROWING + SHAPES + STAGED + PLACED)
+    text = TEXTS[generator.integers(len(TEXTS))]
+    words = re.split(r"(\s+)", "".join(TEXTS))
     parts = re.split(r"(\W)", text)
     for _ in range(generator.integers(1, 5)):
         at = generator.integers(len(parts))
@@ -267,7 +299,12 @@ def outcomes(tmp_path, seed, count):
 
 
 @pytest.mark.parametrize(
-    ("text", "tables"), [(STAGED, ("[[body]]", "[[stage]]")), (PLACED, ("[[nucleation]]", "bound_at"))]
+    ("text", "tables"),
+    [
+        (STAGED, ("[[body]]", "[[stage]]")),
+        (PLACED, ("[[nucleation]]", "bound_at")),
+        (NUCLEATED, ("[[nucleation]]", "[[stage]]")),
+    ],
 )
 def test_without_changes_all_is_written(tmp_path, text, tables):
     (tmp_path / "my.cym").write_text(text)

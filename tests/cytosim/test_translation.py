@@ -14,6 +14,7 @@ from openmm_cylchain.cytosim.spaces import make_space
 from openmm_cylchain.cytosim.translation import translate
 from openmm_cylchain.errors import InputError
 from openmm_cylchain.filaments.end_states import DynamicInstability, TwoUnitCap
+from openmm_cylchain.runs.created_simulation import begin, create_simulation
 from openmm_cylchain.units.quantities import BENDING_RIGIDITY, FORCE, STIFFNESS, VISCOSITY
 from support.cytosim_files import CELL, MICROMETER, RUN, SECOND, SYSTEM, TUBE, translated
 
@@ -449,6 +450,18 @@ def test_walls_contacts_and_boxes(tmp_path):
         assert document.missing == []
 
 
+def test_walls_of_two_cylinders_that_cross(tmp_path):
+    cell = "set space cell { shape = bicylinder }\nnew cell { radius = 4 }\n"
+    fiber = "set fiber tube { rigidity = 20; confine = inside, 100 }\nnew 9 tube { length = 1 }\n"
+    found, document = translated(tmp_path, fiber, cell=cell)
+    assert [wall.shape.axis.tolist() for wall in found.walls] == [[1, 0, 0], [0, 1, 0]]
+    assert document.missing == []
+    middles = np.array(found.filaments[0].positions).mean(axis=1) / MICROMETER
+    assert np.all(np.maximum(middles[:, 0] ** 2, middles[:, 1] ** 2) + middles[:, 2] ** 2 <= 16.0)
+    _, document = translated(tmp_path, fiber.replace("inside", "on"), cell=cell)
+    assert document.missing == ["surfaces: surface of a bicylinder"]
+
+
 def test_walls_of_some_fibers_and_several_of_one(tmp_path):
     cells = "set space cell { shape = sphere }\nnew cell { radius = 9 }\n"
     cells += "set space core { shape = capsule }\nnew core { length = 8; radius = 2 }\n"
@@ -784,6 +797,7 @@ SHAPES = [
     ("ellipse", "length = 2, 3, 4", 3),
     ("cylinder", "length = 4; radius = 1", 3),
     ("cylinderZ", "bottom = -1; top = 2; radius = 1", 3),
+    ("bicylinder", "radius = 2", 3),
     ("torus", "curvature = 3; width = 1", 3),
     ("torus", "curvature = 3; width = 1", 2),
     ("annulus", "inner = 1; outer = 2", 2),
@@ -811,6 +825,39 @@ def test_volumes_of_spaces_are_those_of_what_is_inside(shape, sizes, dimensions)
     assert error < 0.01 * space.volume
     drawn = np.array([space.draw(generator) for _ in range(200)])
     assert np.all(space.inside(drawn))
+
+
+THIN = [
+    ("square", "length = 20, 0, 0", "on", (0, 1, 1)),
+    ("sphere", "radius = 0", "point", (1, 1, 1)),
+    ("capsule", "length = 20; radius = 0", "on", (0, 1, 1)),
+    ("cylinder", "length = 0; radius = 5", "on", (1, 0, 0)),
+    ("cylinderZ", "bottom = 0; top = 0; radius = 0", "inside", (1, 1, 1)),
+]
+
+
+@pytest.mark.parametrize(("shape", "sizes", "mode", "held"), THIN)
+def test_planes_lines_and_points_hold_bodies_with_their_stiffness(tmp_path, shape, sizes, mode, held):
+    """Equipartition across a space that has no width, of 60 beads at 12 times; along it they go where they like."""
+    cell = f"set space rail {{ shape = {shape} }}\nnew rail {{ {sizes} }}\n"
+    text = f"set bead ball {{ confine = {mode}, 1 }}\nnew 60 ball {{ radius = 0.05; position = ball 1 }}\n"
+    found, document = translated(tmp_path, text, SYSTEM.replace("time_step = 0.001", "time_step = 0.005"), cell)
+    assert document.missing == [] and "has a thickness of 0.2 nm" in document.text()
+    simulation, built = create_simulation(found)
+    begin(found, simulation, built)
+    squares = []
+    for _ in range(13):
+        # Three times the relaxation of 6 pi eta R/k.
+        simulation.step(300)
+        positions = simulation.context.getState(positions=True).getPositions(asNumpy=True)._value
+        squares.append(positions[[own[0] for own in built.filaments.body_indices]] ** 2)
+    squares = np.array(squares[1:])
+    expected = 0.0042 / 1.0 * 1e6
+    for axis in np.flatnonzero(held):
+        error = expected * math.sqrt(2.0 / squares[..., axis].size)
+        assert error < 0.06 * expected
+        assert abs(squares[..., axis].mean() - expected) < 4 * error
+    assert np.all(squares.mean(axis=(0, 1))[np.flatnonzero(np.logical_not(held))] > 2 * expected)
 
 
 def test_unknown_places_and_directions_are_said(tmp_path):

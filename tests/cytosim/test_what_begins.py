@@ -9,7 +9,8 @@ from openmm_cylchain.cytosim.command import import_file
 from openmm_cylchain.cytosim.translation import translate
 from openmm_cylchain.runs.configuration import read_configuration
 from openmm_cylchain.runs.created_simulation import begin, create_simulation
-from support.cytosim_files import RUN, SECOND, SYSTEM, TUBE, translated
+from openmm_cylchain.runs.stages import stages_of
+from support.cytosim_files import CELL, RUN, SECOND, SYSTEM, TUBE, translated
 
 # Steps are those of Cytosim, which resolve less.
 pytestmark = pytest.mark.filterwarnings("ignore::openmm_cylchain.TimeStepWarning")
@@ -126,6 +127,24 @@ def test_couples_begin_where_both_hands_are_attached(unbinding, growth, tmp_path
     np.testing.assert_allclose(table.arc_lengths[0], [200.0, 500.0])
 
 
+@pytest.mark.parametrize(("rate", "held"), [(0, 2), (3, 1)])
+def test_hands_are_attached_to_fibers_to_which_they_do_not_bind(tmp_path, rate, held):
+    """If they never bind, so that they do not come back to them."""
+    text = (
+        TUBE + "set fiber rod { rigidity = 20; binding_key = 2 }\nnew 2 tube { length = 2 }\nnew 2 rod { length = 2 }\n"
+    )
+    text += f"set hand glue {{ binding = {rate}, 0.05; unbinding = 0.1; binding_key = 1 }}\n"
+    text += "set couple bridge { hand1 = glue; hand2 = glue; stiffness = 100; diffusion = 1 }\n"
+    text += "new bridge { attach1 = tube1, 0.5; attach2 = rod1, 1 }\nnew bridge { attach1 = tube2, 0.5 }\n"
+    found, document = translated(tmp_path, text)
+    (group,) = found.linkers
+    assert len(group.bound_at) == held and group.count == 2
+    assert document.missing == ([] if held == 2 else ["linkers that begin bound at given places"])
+    simulation, built = create_simulation(found)
+    begin(found, simulation, built)
+    assert np.sum(built.filaments.in_context(simulation.context).linkers().filaments >= 0) == (3 if held == 2 else 1)
+
+
 NUCLEATOR = """set hand maker { unbinding = 0, 3; activity = nucleate;
  nucleate = 40, tube, ( length = 0.2; plus_end = grow ) }
 set single seed { hand = maker; activity = fixed; stiffness = 1000 }
@@ -157,6 +176,47 @@ def test_nucleators_make_one_fiber_each_and_hold_it(tmp_path):
         assert table.arc_lengths[number, 1] < 10.0
 
 
+def test_nucleators_that_diffuse_make_one_fiber_each_where_they_are(tmp_path):
+    cell = "set space cell { shape = square }\nnew cell { length = 8, 8, 8 }\n"
+    cell += "set space floor { shape = strip }\nnew floor { length = 6, 4; bottom = -1; top = -1 }\n"
+    single = "set single seed { hand = maker; diffusion = 1; confine = on,, floor }\nnew 60 seed\n"
+    maker = NUCLEATOR.partition("set single")[0]
+    found, document = translated(tmp_path, GROWING + maker + single, cell=cell, run="run 100 system\n")
+    assert document.missing == [] and document.tables_called("[[linkers]]") == []
+    assert [group.count for group in found.filaments] == [1] * 60
+    simulation, built = create_simulation(found)
+    begin(found, simulation, built)
+    simulation.step(20)
+    nodes = built.filaments.in_context(simulation.context).growth().nodes
+    # A share of 1 - exp(-rate t), uniform in the floor.
+    share = 1.0 - math.exp(-40 * 0.02)
+    assert abs(np.sum(nodes > 0) - 60 * share) < 4 * math.sqrt(60 * share * (1 - share))
+    positions = simulation.context.getState(positions=True).getPositions(asNumpy=True)._value
+    first = np.array([positions[own[0]] for own, count in zip(built.filaments.node_indices, nodes) if count])
+    assert np.abs(first[:, 2] + 1000).max() < 300
+    assert np.all(first[:, :2].max(axis=0) < [3100, 2100]) and np.all(np.ptp(first[:, :2], axis=0) > [4000, 2700])
+
+
+def test_nucleators_that_let_go_make_others(tmp_path):
+    maker = NUCLEATOR.partition("set single")[0].replace("unbinding = 0, 3", "unbinding = 10")
+    text = GROWING + maker + "set single seed { hand = maker; diffusion = 1 }\nnew 30 seed\n"
+    found, document = translated(tmp_path, text)
+    assert document.missing == []
+    (group,) = found.filaments
+    # In each, 1/40 s for making one and 1/10 s for letting go.
+    assert group.nucleation.rate == pytest.approx(30 / (1 / 40 + 1 / 10) / SECOND, rel=1e-6)
+    assert "each of which makes one at nucleate = 40 and lets go at 10" in document.text()
+
+
+@pytest.mark.parametrize("single", ["confine = surface", "diffusion = 1; hand = other"])
+def test_other_nucleators_are_left_out(tmp_path, single):
+    maker = NUCLEATOR.partition("set single")[0]
+    text = GROWING + maker + maker.replace("maker", "other").replace("unbinding", "addictive = 1; unbinding")
+    text += f"set single seed {{ hand = maker; {single} }}\nnew 5 seed\nnew tube {{ length = 1 }}\n"
+    _, document = translated(tmp_path, text)
+    assert "hands: nucleate" in document.missing
+
+
 def test_steps_are_shorter_where_the_first_ones_have_no_solution(tmp_path):
     # An aster outside of its cell, whose walls push it in.
     text = "set fiber tube { rigidity = 30; segmentation = 1; confine = inside, 100 }\nset solid core { }\n"
@@ -180,6 +240,73 @@ def test_steps_are_shorter_where_the_first_ones_have_no_solution(tmp_path):
     simulation, built = create_simulation(found)
     begin(found, simulation, built)
     simulation.step(100)
+
+
+def test_steps_are_shorter_where_later_ones_have_no_solution(tmp_path):
+    # Crossed in a plane, in which neither lets the other one through: it takes 300 steps to tell.
+    text = "set simul system { time_step = 0.005; kT = 0.0042; steric = 1, 400; dim = 2 }\n"
+    text += "set space dish { shape = circle }\nnew dish { radius = 1.1 }\n"
+    text += "set fiber rod { rigidity = 1; segmentation = 0.2; confine = inside, 100; steric = 1, 0.05 }\n"
+    text += "new rod { length = 1; position = 0 0 0; direction = 1 0 0 }\n"
+    text += "new rod { length = 1; position = 0 0 0; direction = 0 1 0 }\nrun 10000 system { nb_frames = 10 }\n"
+    path, output = tmp_path / "my.cym", tmp_path / "my.toml"
+    path.write_text(text)
+    said = import_file(path, output, trial=True)
+    found = read_configuration(output)
+    assert found.simulation.time_step < 5e9
+    assert not any("were tried" in line for line in said)
+    simulation, built = create_simulation(found)
+    begin(found, simulation, built)
+    simulation.step(1000)
+
+
+@pytest.mark.parametrize(("system", "change"), [("steric = 1, 10", ""), ("", "change system { steric = 1, 10 }\n")])
+def test_contacts_with_which_no_step_can_be_taken_are_turned_off(tmp_path, monkeypatch, system, change):
+    """From the beginning, and in a later stage."""
+
+    def trouble(configuration):
+        touch = any(stage.configuration.contacts is not None for stage in stages_of(configuration))
+        return ("Filament 0 would pass through filament 1." if touch else None), None
+
+    monkeypatch.setattr("openmm_cylchain.cytosim.trial._trouble", trouble)
+    path, output = tmp_path / "my.cym", tmp_path / "my.toml"
+    tube = TUBE.replace("rigidity", "steric = 1, 0.02; rigidity") + "new 3 tube { length = 1 }\n"
+    path.write_text(SYSTEM.replace("dim", f"{system}; dim") + CELL + tube + RUN + change + RUN)
+    said = import_file(path, output, trial=True)
+    assert any(
+        "contacts, with which the first steps have no solution, however short: Filament 0" in own for own in said
+    )
+    found = read_configuration(output)
+    assert found.simulation.time_step == 1e9
+    assert not any(stage.configuration.contacts for stage in stages_of(found))
+    # They can be turned on again.
+    assert output.read_text().count("active = false") == 1
+    output.write_text(output.read_text().replace("active = false", "active = true"))
+    assert stages_of(read_configuration(output))[-1].configuration.contacts.diameter == 40
+
+
+def test_first_steps_of_beads_in_a_periodic_space(tmp_path):
+    text = SYSTEM.replace("dim", "steric = 1, 100; dim") + "set space cell { shape = periodic }\n"
+    text += "new cell { length = 4, 4, 4 }\nset bead ball { steric = 1 }\nnew 20 ball { radius = 0.3 }\n" + RUN
+    path = tmp_path / "my.cym"
+    path.write_text(text)
+    said = import_file(path, tmp_path / "my.toml", trial=True)
+    assert "  left out: nothing" in said
+    assert read_configuration(tmp_path / "my.toml").contacts.diameter is None
+
+
+def test_what_there_was_no_time_to_try_is_said(tmp_path, monkeypatch):
+    path = tmp_path / "my.cym"
+    path.write_text(FLAT + DISC + TUBE + "new 3 tube { length = 1 }\n" + RUN + "change tube { rigidity = 10 }\n" + RUN)
+    assert not any("were tried" in line for line in import_file(path, tmp_path / "tried.toml", trial=True))
+    monkeypatch.setattr("openmm_cylchain.cytosim.trial._MOST_SECONDS", 0.0)
+    said = import_file(path, tmp_path / "my.toml", trial=True)
+    assert "  Not all of the first steps were tried, since they are slow: run 1, run 2." in said
+    # Nor for filaments to come apart, those of a later run among them.
+    thick = path.read_text().replace("rigidity", "steric = 1, 0.05; rigidity", 1).replace("dim", "steric = 1, 9; dim")
+    path.write_text(thick)
+    said = import_file(path, tmp_path / "thick.toml", trial=True)
+    assert "  Its filaments overlap, and do not come apart within 0 s: it may not run." in said
 
 
 def test_spaces_that_deform_keep_their_shapes_and_say_so(tmp_path):

@@ -1,5 +1,7 @@
 """Rigid bodies: what they are, what they refuse, and how they move by themselves, in a flow and from a checkpoint."""
 
+import math
+
 import numpy as np
 import openmm
 import pytest
@@ -52,6 +54,12 @@ def test_friction_of_two_spheres():
     assert body.rotational_friction(NUMBER) == pytest.approx(np.diag([own + across, own + across, own]))
     # One beside the line.
     assert len(body.points) == 3
+
+
+@pytest.mark.parametrize("viscosity", [0.0, -1.0, math.inf, math.nan, "thick"])
+def test_a_viscosity_must_be_positive(viscosity):
+    with pytest.raises(InputError, match="Body: viscosity"):
+        Body.sphere(10, viscosity=viscosity)
 
 
 @pytest.mark.parametrize(
@@ -130,10 +138,13 @@ def test_topology():
     assert positions._value[filaments.body_indices[0]] == pytest.approx(filaments.bodies[0].positions)
 
 
-@pytest.mark.parametrize("step", [0.01, 20.0])
-def test_diffusion(step):
+@pytest.mark.parametrize(("step", "times"), [(0.01, None), (20.0, None), (20.0, 5.0)])
+def test_diffusion(step, times):
+    """Also in a viscosity of its own."""
     radius, count = 20.0, 1500
-    body = Body.sphere(radius, [[radius, 0, 0]])
+    body = Body.sphere(radius, [[radius, 0, 0]], viscosity=None if times is None else times * VISCOSITY)
+    assert body.friction(VISCOSITY) == pytest.approx(6 * np.pi * NUMBER * radius * (times or 1.0))
+    assert body.rotational_friction(NUMBER)[0, 0] == pytest.approx(8 * np.pi * NUMBER * radius**3 * (times or 1.0))
     filaments = _bodies(body, count)
     _, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, step * MICROSECOND, random_seed=1, checks=False)

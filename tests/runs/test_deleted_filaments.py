@@ -1,11 +1,12 @@
 """Filaments that stages delete or cut: which ones, and what happens to all that holds them."""
 
 import json
+import warnings
 
 import numpy as np
 import pytest
 
-from openmm_cylchain import InputError, analysis
+from openmm_cylchain import InputError, StageWarning, analysis
 from openmm_cylchain.cli import main
 from openmm_cylchain.export.simularium import write_simularium
 from openmm_cylchain.output.read_tables import read_reports, read_table
@@ -136,6 +137,60 @@ def test_grown_filaments_go_with_their_monomers(tmp_path):
     ]
     cuts = severed[laser[0]] - severed[middle[-1]]
     assert 3 <= cuts <= sum(crossings) <= cuts + 3
+
+
+ROD_THAT_IS_CUT = """
+[solvent]
+temperature = "300 K"
+viscosity = "1 Pa*s"
+[[monomers]]
+name = "unit"
+length = "10 nm"
+plus_on_rate = "1 1/(uM*s)"
+plus_off_rate = "1 1/s"
+concentration = "0 uM"
+[[filament]]
+name = "ROD"
+diameter = "10 nm"
+segment_length = "100 nm"
+persistence_length = "1 mm"
+stretching_modulus = "1 nN"
+segments = 8
+position = ["-0.4 um", "0 um", "0 um"]
+direction = [1, 0, 0]
+growth = { longest = "1 um", shortest = "0.1 um", severing_rate = "0 1/(um*s)" }
+reserve = 3
+[simulation]
+time_step = "1 us"
+report_interval = "10 us"
+seed = 1
+[[stage]]
+duration = "10 us"
+[[stage]]
+name = "laser"
+duration = "10 us"
+[stage.filament.ROD]
+cut = [{ normal = [1, 0, 0] }, { point = ["0.2 um", "0 um", "0 um"], normal = [1, 0, 0] }]
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "cuts"),
+    [("", "", 2), ("reserve = 3", "reserve = 1", 1), ('["0.2 um"', '["0.35 um"', 1)],
+)
+def test_a_run_says_where_planes_cut_and_where_not(tmp_path, capsys, old, new, cuts):
+    """Neither without a place for a part, nor where it would be too short; the dry run says so too."""
+    configuration = parse_configuration(ROD_THAT_IS_CUT.replace(old, new))
+    text = f"laser: filaments of [[filament]] number 1 are cut at {cuts} of the 2 places"
+    for simulate in (lambda: run(configuration, tmp_path / "out"), lambda: list(dry_run(configuration))):
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            simulate()
+        warned = [str(own.message) for own in found if own.category is StageWarning]
+        assert len(warned) == (cuts < 2) and all(own.startswith(text) for own in warned)
+    assert text in capsys.readouterr().out
+    severed = read_reports(tmp_path / "out" / "growth.csv")["filaments severed"][:, 0]
+    assert severed.tolist() == [0, 0, cuts]
 
 
 def test_each_has_the_same_chance():

@@ -131,6 +131,49 @@ def test_filaments_that_cannot_come_apart_are_shifted(planar, monkeypatch):
     assert len(begun_at) == 4
 
 
+FULL = """
+[solvent]
+temperature = "300 K"
+viscosity = "10 mPa*s"
+[box]
+edges = ["200 nm", "200 nm", "200 nm"]
+[[filament]]
+name = "ROD"
+diameter = "8 nm"
+segment_length = "60 nm"
+persistence_length = "10 um"
+stretching_modulus = "1 nN"
+segments = 1
+count = COUNT
+KIND
+[contacts]
+diameter = "20 nm"
+[simulation]
+time_step = "1 ns"
+duration = "10 ns"
+report_interval = "10 ns"
+"""
+
+
+@pytest.mark.parametrize(
+    ("count", "kind", "share"),
+    # pi d^2/4 of 60 nm in (200 nm)^3, or 60 nm times d in (200 nm)^2.
+    [(400, "", "94 %"), (34, "planar = true", "102 %"), (384, "", None), (33, "planar = true", None)],
+)
+def test_filaments_that_fill_a_box_are_refused_at_once(monkeypatch, count, kind, share):
+    configuration = parse_configuration(FULL.replace("COUNT", str(count)).replace("KIND", kind))
+    built = build_system(configuration, None, 1)
+    begun = []
+    monkeypatch.setattr(Filaments, "create_integrator", lambda *_, **__: begun.append(1) or 1 / 0)
+    if share is None:
+        with pytest.raises(ZeroDivisionError):
+            relaxed_positions(configuration, built)
+    else:
+        with pytest.raises(InputError, match=f"would fill {share} of the box"):
+            relaxed_positions(configuration, built)
+        assert not begun
+
+
 def test_places_in_a_torus_have_the_same_chance():
     """The mean distance from the axis is R + r^2/4R, and half of all are below the plane of the circle."""
     table = {"shape": "torus", "axis": [0, 0, 1], "major_radius": "300 nm", "minor_radius": "200 nm"}

@@ -93,6 +93,12 @@ BODY = TableKind(
             None,
             "In place of radius: that of a sphere about each point, or zero for one that is a place alone.",
         ),
+        Key(
+            "viscosity",
+            Quantity(units.VISCOSITY),
+            None,
+            "Of what it moves in, and to which its friction is in proportion; that of the solvent if not given.",
+        ),
         Key("count", Whole(1, _MOST_BODIES, "10"), None, "How many begin at random places."),
         Key(
             "positions",
@@ -207,7 +213,7 @@ def read_body(entries, tables, groups, box, seed):
         points, held = _held(entries, tables, groups, planar, count, points, radii, [seed, *entries.place.path[1:], 7])
         radii = np.concatenate([radii, np.zeros(len(points) - len(radii))])
     with entries.naming():
-        body = Body(points, radii, entries["name"])
+        body = Body(points, radii, entries["name"], entries["viscosity"])
     return BodyGroup(
         body,
         count,
