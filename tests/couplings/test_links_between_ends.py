@@ -94,7 +94,7 @@ def test_a_loop_costs_what_it_should_at_the_recommended_step():
 
 
 def test_the_j_factor_of_a_wormlike_chain_is_that_of_its_fine_chain():
-    # Four million draws of chains in segments of a twentieth of the persistence length, with a spring of 0.03 k_BT/nm^2.
+    # Four million draws of chains in segments of a twentieth of the persistence length, with 0.03 k_BT/nm^2.
     drawn = {100.0: 4.40e-8, 150.0: 6.90e-8, 200.0: 6.90e-8}
     lengths = np.array(list(drawn))
     assert theory.wlc_j_factor(lengths, 50 * unit.nanometer) == pytest.approx(np.array(list(drawn.values())), rel=0.1)
