@@ -249,8 +249,8 @@ def _add_chain(force, filament, nodes, viscosity, temperature):
     for joint, stiffness in enumerate(stiffnesses):
         force.setJointParameters(chain, joint, float(stiffness))
     if has_twist(kind):
-        joints, axial = len(stiffnesses), kind.axial_friction(viscosity)
-        force.setChainTwist(chain, [kind.twist_stiffness] * joints, [0.0] * joints, [axial] * filament.segments)
+        of_joints = ([own] * len(stiffnesses) for own in (kind.twist_stiffness, kind.rest_twist))
+        force.setChainTwist(chain, *of_joints, [kind.axial_friction(viscosity)] * filament.segments)
 
 
 def _add_body(force, placed, particles, viscosity):

@@ -13,6 +13,7 @@ from ..mechanics.friction import EndCorrections, SegmentFriction, affine_extensi
 from ..mechanics.geometry import joined
 from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS, BendingPotential, StretchingPotential
 from ..units.quantities import (
+    ANGLE_PER_LENGTH,
     BENDING_RIGIDITY,
     DIMENSIONLESS,
     ENERGY,
@@ -24,6 +25,7 @@ from ..units.quantities import (
     TEMPERATURE,
     TIME,
     VISCOSITY,
+    finite_number,
     in_units_of,
     numbers_to_compute_with,
     one_of,
@@ -105,7 +107,10 @@ class FilamentType(ChainType):
         The length l_t = C/k_B T over which twist is lost: the frames of two places of the free filament at a distance s
         along it have ``<cos(turn)> = exp(-s/2 l_t)``. Without it, and without a torsional rigidity, there is no twist.
     torsional_rigidity : energy*length
-        Instead of it: C of the twist energy (C/2 l0) m^2 of a joint with the twist m in radians. See Notes.
+        Instead of it: C of the twist energy (C/2 l0) (m - m0)^2 of a joint with the twist m in radians. See Notes.
+    intrinsic_twist : angle/length, optional
+        How much the filament is twisted at rest, per length of its contour: B-DNA by about 1.8 radians/nm. Zero if not
+        given; positive is right-handed. m0 is that of the contour that a segment stands for.
     mass_per_length : mass/length
         Only for the relaxation times of momenta, eq. (51), and for the masses that OpenMM asks for:
         the dynamics is overdamped and does not depend on it.
@@ -128,8 +133,9 @@ class FilamentType(ChainType):
 
     Twist is for straight segments of open filaments and rings in space, with scheme "implicit" of the compiled engine.
     Each segment has a material frame, which turns about the segment against the friction 4 pi eta (d/2)^2 l0 of a
-    cylinder; m is the angle between two of them beyond parallel transport. The filament is isotropic and not twisted at
-    rest. What holds frames at its ends is added by ``Filaments.add_end_frame``.
+    cylinder; m is the angle between two of them beyond parallel transport. What holds frames at its ends is added by
+    ``Filaments.add_end_frame``. The filament bends as easily in all directions of its frames, and is straight at rest:
+    so its intrinsic twist is what twists and linking numbers are counted from, and changes neither shapes nor torques.
 
     A type keeps the persistence length as ``bending_rigidity`` a = l_p k_B T, the rigidity of the continuous filament,
     with the ``temperature``: the two together mean the same as l_p = a/k_B T with the temperature. So
@@ -157,6 +163,7 @@ class FilamentType(ChainType):
     calibrated_force: float | None = None
     torsional_rigidity: float | None = None
     twist_persistence_length: float | None = field(default=None, repr=False)
+    intrinsic_twist: float = 0.0
 
     if TYPE_CHECKING:  # What may be given; the attributes hold plain numbers.
 
@@ -184,6 +191,7 @@ class FilamentType(ChainType):
             calibrated_force: Scalar | None = None,
             torsional_rigidity: Scalar | None = None,
             twist_persistence_length: Scalar | None = None,
+            intrinsic_twist: Scalar = 0.0,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -251,6 +259,9 @@ class FilamentType(ChainType):
 
     def _resolve_twist(self):
         name = f"of filament type {self.name!r}"
+        intrinsic = finite_number(self.intrinsic_twist, ANGLE_PER_LENGTH, f"intrinsic_twist {name}")
+        self._check_magnitude("intrinsic_twist", abs(intrinsic))
+        self._set("intrinsic_twist", intrinsic)
         if self.torsional_rigidity is not None and self.twist_persistence_length is not None:
             self._fail("give either torsional_rigidity or twist_persistence_length (with its temperature).")
         if self.torsional_rigidity is not None:
@@ -261,6 +272,8 @@ class FilamentType(ChainType):
             length = positive(self.twist_persistence_length, LENGTH, f"twist_persistence_length {name}")
             rigidity = length * thermal_energy(self.temperature)
         else:
+            if intrinsic != 0.0:
+                self._fail("intrinsic_twist needs a torsional_rigidity or a twist_persistence_length.")
             return
         self._refuse_beam("twist")
         self._check_magnitude("torsional_rigidity", rigidity)
@@ -360,6 +373,11 @@ class FilamentType(ChainType):
         if self.torsional_rigidity is None:
             self._fail("it has no twist: give it a torsional_rigidity or a twist_persistence_length.")
         return cast(float, self.torsional_rigidity) / self.segment_length
+
+    @property
+    def rest_twist(self) -> float:
+        """Twist m0 of one joint at rest in radians: ``intrinsic_twist`` times the contour that a segment stands for."""
+        return self.intrinsic_twist * (self.contour_per_segment or self.segment_length)
 
     def axial_friction(self, viscosity: Scalar) -> float:
         """Friction 4 pi eta (d/2)^2 l0 of one segment against turning about itself, in kJ ps/mol.

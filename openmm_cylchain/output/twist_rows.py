@@ -16,9 +16,9 @@ def rows_of_twist(
 ) -> Iterator[tuple[float, ...]]:
     """What lines of TWIST_COLUMNS say behind step and time, for filaments with some numbers.
 
-    The torque is the mean of (C/l0) m over joints between segments.
+    The torque is the mean of (C/l0) (m - m0) over joints between segments.
     """
     for number in numbers:
         twists = filaments.in_context(context).twists(number)._value
-        stiffness = cast(FilamentType, filaments[number].type).twist_stiffness
-        yield number, float(twists.sum()), float(stiffness * twists[1:-1].mean())
+        kind = cast(FilamentType, filaments[number].type)
+        yield number, float(twists.sum()), float(kind.twist_stiffness * (twists[1:-1] - kind.rest_twist).mean())

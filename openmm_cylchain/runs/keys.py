@@ -43,6 +43,7 @@ _RANGES = {
     units.NUMBER_DENSITY: (1e-27, 1e6),
     units.ENERGY: (1e-9, 1e12),
     units.ANGLE: (1e-9, 1e3),
+    units.ANGLE_PER_LENGTH: (1e-12, 1e3),
 }
 
 _UNSIGNED = r"\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*(\s1\s*/|[(°A-Za-zµμÅ]).*"

@@ -326,8 +326,9 @@ class FilamentsInContext:
     def twists(self, filament: int) -> unit.Quantity:
         """Twists of a filament: the angle of the material frames of neighbouring segments beyond parallel transport.
 
-        They are followed in time and not wrapped, so no turn is lost. A Context begins with zero. Checkpoints and
-        States with ``integratorParameters=True`` hold them; setting positions does not change them.
+        They are followed in time and not wrapped, so no turn is lost. A Context begins with ``rest_twist`` of the type
+        in each joint, and with zero at ends. Checkpoints and States with ``integratorParameters=True`` hold them;
+        setting positions does not change them.
 
         Parameters
         ----------
@@ -350,6 +351,8 @@ class FilamentsInContext:
 
     def set_twists(self, filament: int, twists: npt.ArrayLike) -> None:
         """Give a filament other twists, such as those of another run, or of a ring that is closed with some turns.
+
+        Those of a ring whose ends are joined add up to 2 pi (Lk - Wr), with a whole linking number Lk.
 
         Parameters
         ----------

@@ -143,7 +143,7 @@ def check_time_step(
         Whether filaments were drawn from equilibrium: then the exact averages of free ones count for the verdict.
     twists : mapping of int to array of angles, optional
         Of filaments, by their numbers: with which they begin, as ``FilamentsInContext.twists`` returns them. The others
-        begin without twist.
+        begin with twists at rest.
     platform : openmm.Platform, optional
     properties : dict, optional
         Of the platform.

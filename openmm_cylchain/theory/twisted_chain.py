@@ -26,7 +26,7 @@ def chain_twist_variance(filament_type: FilamentType, temperature: Scalar) -> fl
 
 
 def chain_mean_turn_cosine(filament_type: FilamentType, segments: int, temperature: Scalar) -> float:
-    """Mean cosine exp(-n k_B T l0/2C) of the twist of so many joints n of a free chain; exact.
+    """Mean cosine cos(n m0) exp(-n k_B T l0/2C) of the twist of so many joints n of a free chain; exact.
 
     Parameters
     ----------
@@ -37,7 +37,8 @@ def chain_mean_turn_cosine(filament_type: FilamentType, segments: int, temperatu
     temperature : temperature
     """
     count = whole_number(segments, 0, "segments")
-    return float(np.exp(-0.5 * count * chain_twist_variance(filament_type, temperature)))
+    decay = np.exp(-0.5 * count * chain_twist_variance(filament_type, temperature))
+    return float(decay * np.cos(count * filament_type.rest_twist))
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class TwistedChain:
     writhe_per_segment : float
         Mean writhe <Wr> of a segment.
     turns_per_segment : float
-        Mean turns Lk of a segment: of twist and writhe.
+        Mean turns Lk of a segment, of twist and writhe, beyond those at rest.
     effective_torsional_rigidity : float
         C_eff in kJ nm/mol without torque: k_B T L over the variance of the angle between the ends.
     """

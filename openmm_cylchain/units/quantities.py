@@ -20,6 +20,7 @@ BOLTZMANN = unit.MOLAR_GAS_CONSTANT_R.value_in_unit(unit.kilojoule_per_mole / un
 
 LENGTH = unit.nanometer
 ANGLE = unit.radian
+ANGLE_PER_LENGTH = unit.radian / unit.nanometer
 VOLUME = unit.nanometer**3
 NUMBER_DENSITY = unit.nanometer**-3
 TIME = unit.picosecond

@@ -9,6 +9,7 @@ from openmm import unit
 from ..errors import InputError
 from .quantities import (
     ANGLE,
+    ANGLE_PER_LENGTH,
     AVOGADRO,
     BENDING_RIGIDITY,
     DIFFUSION,
@@ -54,6 +55,7 @@ _EXAMPLES = {
     NUMBER_DENSITY: ("concentration", "1 uM"),
     ENERGY: ("energy", "20 kJ/mol"),
     ANGLE: ("angle", "60 deg"),
+    ANGLE_PER_LENGTH: ("angle per length", "1.8 rad/nm"),
 }
 """What to call a quantity with such a unit, and how people write one."""
 

@@ -1,6 +1,7 @@
 """Filaments with twist: what they are given, their equilibrium at any step, linking numbers, and what is refused."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import openmm
@@ -34,6 +35,9 @@ CHAIN = {
     "bending_model": "kratky-porod",
 }
 DNA = FilamentType(torsional_rigidity=100.0 * KT, **CHAIN)
+# Of B-DNA, with 10.5 base pairs of 0.34 nm in a turn.
+INTRINSIC = 2 * np.pi / 3.57
+HELIX = replace(DNA, intrinsic_twist=INTRINSIC)
 UNTWISTED = FilamentType(**CHAIN)
 END = 4.0 * KT
 NANOSECOND = 1e3
@@ -64,7 +68,7 @@ def held_chains(chains, segments, torque=None, kind=DNA):
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     for number in range(chains):
         filaments.add_straight(kind, segments, [100.0 * number, 0, 0], [0, 0, 1], clamped=[0, 1])
-        if kind is DNA:
+        if kind is not UNTWISTED:
             filaments.add_end_frame(number, "minus", [0, 0, 2.0])
             filaments.add_end_frame(number, "plus", [0, 0, 1.0], torque=torque)
     return filaments
@@ -97,6 +101,19 @@ def test_rigidity_is_given_with_units_or_as_a_length():
     assert one.axial_friction(1e-3 * unit.pascal * unit.second) == pytest.approx(one.axial_friction(viscosity))
 
 
+def test_intrinsic_twist_is_given_with_units_and_kept_by_contour():
+    degrees = FilamentType(torsional_rigidity=1.0, intrinsic_twist=-36 * unit.degree / unit.angstrom, **CHAIN)
+    assert degrees.intrinsic_twist == pytest.approx(-2 * np.pi)
+    assert degrees.rest_twist == pytest.approx(-2 * np.pi * LENGTH)
+    assert degrees.with_segment_length(10.0).rest_twist == pytest.approx(-20 * np.pi)
+    assert DNA.rest_twist == 0.0
+    kind = replace(HELIX, stretching_modulus=1100 * unit.piconewton, temperature=TEMPERATURE)
+    calibrated = theory.calibrated_up_to_force(kind, 5 * unit.piconewton, TEMPERATURE)
+    assert calibrated.segment_length != LENGTH and calibrated.rest_twist == HELIX.rest_twist
+    whole = theory.chain_mean_turn_cosine(HELIX, 3, TEMPERATURE)
+    assert whole == pytest.approx(np.cos(15 * INTRINSIC) * theory.chain_mean_turn_cosine(DNA, 3, TEMPERATURE))
+
+
 @pytest.mark.parametrize(
     ("own", "message"),
     [
@@ -107,6 +124,9 @@ def test_rigidity_is_given_with_units_or_as_a_length():
         ({"twist_persistence_length": 50.0}, "temperature"),
         ({"twist_persistence_length": -1.0, "temperature": 300.0}, "twist_persistence_length"),
         ({"twist_persistence_length": 50.0, "torsional_rigidity": 1.0, "temperature": 300.0}, "either"),
+        ({"intrinsic_twist": 1.8}, "intrinsic_twist needs a torsional_rigidity"),
+        ({"intrinsic_twist": np.nan, "torsional_rigidity": 1.0}, "intrinsic_twist"),
+        ({"intrinsic_twist": 1.8 * unit.radian, "torsional_rigidity": 1.0}, "intrinsic_twist"),
     ],
 )
 def test_bad_rigidities_are_refused(own, message):
@@ -196,7 +216,7 @@ def test_twists_are_asked_for_and_set():
 
 
 def test_force_survives_xml():
-    filaments = held_chains(2, 4, torque=1.5)
+    filaments = held_chains(2, 4, torque=1.5, kind=HELIX)
     _, system, _ = filaments.build()
     copy = openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(system))
     force, original = (
@@ -204,6 +224,7 @@ def test_force_survives_xml():
         for one in (copy, system)
     )
     assert force.getChainTwist(1) == original.getChainTwist(1)
+    assert force.getChainTwist(1)[1] == (HELIX.rest_twist,) * 3
     for end in (0, 1):
         assert str(force.getEndFrame(1, end)) == str(original.getEndFrame(1, end))
 
@@ -214,7 +235,7 @@ def test_checkpoint_goes_on_to_the_bit(platform):
 
     def chains_and_a_ring():
         filaments = held_chains(3, 12)
-        filaments.add_ring(DNA, 12, [500, 0, 0])
+        filaments.add_ring(HELIX, 12, [500, 0, 0])
         return in_context(filaments, 100 * NANOSECOND, pull=KT, platform=platform)
 
     (context, own), *others = [chains_and_a_ring() for _ in range(4)]
@@ -272,10 +293,10 @@ def test_step_is_checked():
     """Of free chains and of rings that begin, in each window, with the turns that they have."""
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     for number in range(8):
-        filaments.add_equilibrium(DNA, 8, number)
-    rings = [filaments.add_ring(DNA, 16, [200.0 * number, 0, 0]) for number in range(2)]
+        filaments.add_equilibrium(HELIX, 8, number)
+    rings = [filaments.add_ring(HELIX, 16, [200.0 * number, 0, 0]) for number in range(2)]
     _, system, positions = filaments.build()
-    twists = {ring: np.full(16, np.pi / 16) for ring in rings}
+    twists = {ring: np.full(16, HELIX.rest_twist + np.pi / 16) for ring in rings}
     check = check_time_step(filaments, system, positions, NANOSECOND, frames=48, twists=twists)
     free, closed = check["DNA x 8 twist, mean square"], check["DNA x 16 twist, mean square"]
     assert check["DNA x 8 twist energy"].values == pytest.approx((0.5, 0.5), rel=0.25)
@@ -345,6 +366,55 @@ def test_frames_turn():
     # Friction lets the turns lag behind.
     assert twists == pytest.approx(0.4 / 8 * np.array([0.5, *[1] * 7, 0.5]), rel=0.1)
     assert positions_of(context)[:, :2] == pytest.approx(0.0, abs=1e-12)
+
+
+# Intrinsic twist
+
+
+def rings_and_chains(kind):
+    """A ring with two turns more than at rest, a chain that is held in two, one with a torque, and a free one."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    for number, torque in enumerate((None, 2 * KT)):
+        filaments.add_straight(kind, 12, [100.0 * number, 0, 0], [0, 0, 1], clamped=[0, 1])
+        filaments.add_end_frame(number, "minus", [0, 0, 1])
+        filaments.add_end_frame(number, "plus", [0, 0, 1], torque=torque)
+    filaments.add_equilibrium(kind, 12, 1, start=[300, 0, 0])
+    filaments.add_ring(kind, 24, [400, 0, 0])
+    context, own = in_context(filaments, 10 * NANOSECOND, pull=KT)
+    own.turn_end(0, "plus", 4 * np.pi)
+    own.set_twists(3, own.twists(3)._value + 4 * np.pi / 24)
+    return filaments, context, own
+
+
+def test_intrinsic_twist_is_what_twists_are_counted_from():
+    """Chains move as those without, and the torque of a ring with Lk0 + 2 turns is that of one with 2."""
+    filaments, context, own = rings_and_chains(HELIX)
+    _, plain, of_plain = rings_and_chains(DNA)
+    relaxed = 24 * LENGTH * INTRINSIC
+    for _ in range(8):
+        for one in (context, plain):
+            one.getIntegrator().step(5)
+        # Rounding grows as paths part.
+        assert positions_of(context) == pytest.approx(positions_of(plain), abs=1e-6)
+        for number in range(4):
+            rest = HELIX.rest_twist * (np.ones(24) if number == 3 else np.array([0, *[1] * 11, 0]))
+            assert own.twists(number)._value - rest == pytest.approx(of_plain.twists(number)._value, abs=1e-6)
+        writhe = analysis.writhe(positions_of(context)[filaments.node_indices[3]])
+        assert own.twists(3)._value.sum() + 2 * np.pi * writhe == pytest.approx(relaxed + 4 * np.pi, abs=1e-9)
+
+
+def test_ring_without_noise_stays_at_its_intrinsic_twist():
+    """A ring that begins has no torque: one with any whole Lk that is not N m0/2 pi has some."""
+    filaments = Filaments(VISCOSITY, 0.0)
+    for number in range(2):
+        filaments.add_ring(HELIX, 24, [100.0 * number, 0, 0])
+    context, own = in_context(filaments, 10 * NANOSECOND)
+    own.set_twists(1, np.full(24, 2 * np.pi * round(24 * HELIX.rest_twist / (2 * np.pi)) / 24))
+    context.getIntegrator().step(20)
+    assert own.twists(0)._value == pytest.approx(np.full(24, HELIX.rest_twist))
+    # 33.61 turns at rest, of 34 which are kept.
+    torque = HELIX.twist_stiffness * (own.twists(1)._value - HELIX.rest_twist)
+    assert torque == pytest.approx(np.full(24, 100 * KT * 2 * np.pi * (34 / 120 - 1 / 3.57)))
 
 
 # Equilibrium

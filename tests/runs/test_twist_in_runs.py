@@ -38,6 +38,16 @@ def test_twist_and_torque_at_each_report(wound):
     assert torque[10:].mean() == pytest.approx(2 * np.pi * rigidity * turns[10:].mean() / 100.0, rel=0.1)
 
 
+def test_intrinsic_twist(wound, tmp_path):
+    """It is among the turns, and the torque is that without it."""
+    text = WOUND.replace('"100 nm"', '"100 nm"\nintrinsic_twist = "-34.3 deg/angstrom"')
+    assert main(_run(text, tmp_path)) == 0
+    run, plain = analysis.load(tmp_path / "out").twist, analysis.load(wound).twist
+    difference = run["twist (turns)"] - plain["twist (turns)"]
+    np.testing.assert_allclose(difference, np.full((41, 2), -343 / 360 * 19 * 5), rtol=1e-6)
+    np.testing.assert_allclose(run["torque (pN nm)"][:5], plain["torque (pN nm)"][:5], rtol=1e-4, atol=1e-4)
+
+
 def test_a_resumed_run_is_the_same(wound, tmp_path, monkeypatch):
     stop_and_resume(_run(WOUND, tmp_path), monkeypatch, checkpoints=3)
     for name in ("twist.csv", "energies.csv", "trajectory.dcd"):
@@ -69,6 +79,8 @@ def test_a_torsional_rigidity_in_place_of_a_length():
         ('twist_persistence_length = "100 nm"\n', "", "number 1.*filament 0 has no twist: give its type"),
         ('"100 nm"', '"100 nm"\ntorsional_rigidity = "411 pN nm^2"', "give either torsional_rigidity or"),
         ('"100 nm"', '"-100 nm"', "twist_persistence_length"),
+        ('"100 nm"', '"100 nm"\nintrinsic_twist = "1.8 nm"', "angle per length"),
+        ('twist_persistence_length = "100 nm"', 'intrinsic_twist = "1.8 rad/nm"', "intrinsic_twist needs a torsional"),
         ('"100 nm"', '"100 nm"\nelement = "beam"', "twist"),
         ('end = "plus"', 'end = "right"', "end"),
         ('end = "plus"', 'end = "minus"', "has a frame already"),

@@ -50,7 +50,7 @@ class Ring:
     def contact_energies(self, nodes):
         """(copies,). A segment touches another one where no neighbour of either is nearer: joints count once."""
         first, second, distances, parallel = self.pairs(nodes)
-        apart = np.full((len(nodes), self.segments, self.segments), np.inf)
+        apart = np.full((len(nodes), nodes.shape[1], nodes.shape[1]), np.inf)
         apart[:, first, second] = apart[:, second, first] = distances[0]
         nearest = np.full(apart.shape, True)
         for axis in (1, 2):

@@ -33,15 +33,8 @@ class SupercoiledRing(Ring):
         return self.joint * (1.0 - cosines), 0.5 * self.stretching * (lengths - self.length) ** 2
 
     def writhes(self, nodes):
-        """(copies,), of the solid angles of pairs of segments that are no neighbours."""
-        first, second = np.triu_indices(self.segments, 2)
-        first, second = (own[second - first < self.segments - 1] for own in (first, second))
-        # With x, y and z in front, as contiguous arrays.
-        starts = np.ascontiguousarray(np.moveaxis(nodes, 2, 0))
-        ends = np.roll(starts, -1, axis=2)
-        corners = [one[..., first] - other[..., second] for one in (starts, ends) for other in (starts, ends)]
-        angles = _solid_angles(corners[0], corners[2], corners[3]) + _solid_angles(corners[0], corners[3], corners[1])
-        return -angles.sum(axis=1) / (2.0 * np.pi)
+        """(copies,), see ``writhes_of_polygons``."""
+        return writhes_of_polygons(nodes)
 
     def held_energies(self, nodes):
         """Of walls, and of the link: an array (copies, 2)."""
@@ -58,6 +51,19 @@ class SupercoiledRing(Ring):
         return np.column_stack(
             [self.writhes(nodes), sizes, self.contact_energies(nodes), bends, self.held_energies(nodes)]
         )
+
+
+def writhes_of_polygons(nodes):
+    """(copies,), of the solid angles of pairs of segments that are no neighbours."""
+    segments = nodes.shape[1]
+    first, second = np.triu_indices(segments, 2)
+    first, second = (own[second - first < segments - 1] for own in (first, second))
+    # With x, y and z in front, as contiguous arrays.
+    starts = np.ascontiguousarray(np.moveaxis(nodes, 2, 0))
+    ends = np.roll(starts, -1, axis=2)
+    corners = [one[..., first] - other[..., second] for one in (starts, ends) for other in (starts, ends)]
+    angles = _solid_angles(corners[0], corners[2], corners[3]) + _solid_angles(corners[0], corners[3], corners[1])
+    return -angles.sum(axis=1) / (2.0 * np.pi)
 
 
 def _solid_angles(a, b, c):
@@ -80,7 +86,7 @@ class SupercoilMonteCarlo(RingMonteCarlo):
     def __init__(self, ring, nodes, seed, winding):
         super().__init__(ring, nodes, seed)
         self._writhes, self._turns = ring.writhes(self.nodes), 0.0
-        for self._turns in np.linspace(0.0, ring.turns, winding):
+        for self._turns in np.linspace(ring.turns, 0.0, winding, endpoint=False)[::-1]:
             self.sweep()
 
     def sweep(self, sweeps=1):

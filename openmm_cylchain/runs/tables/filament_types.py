@@ -78,8 +78,11 @@ _QUANTITIES = {
     ),
     "torsional_rigidity": (units.BENDING_RIGIDITY, "Torsional rigidity, C; without it, filaments have no twist."),
     "twist_persistence_length": (units.LENGTH, "In place of torsional_rigidity: C over k_B T, as persistence_length."),
+    "intrinsic_twist": (units.ANGLE_PER_LENGTH, "How much filaments with twist are twisted at rest; right-handed."),
     "mass_per_length": (units.MASS_PER_LENGTH, "For other programs: motion does not depend on it."),
 }
+# All others are positive.
+_SIGNS = {"bending_rigidity": "zero", "intrinsic_twist": "any"}
 _TEXTS = ("name", "element", "bending_model", "stretching_model")
 _CYLINDER_KEYS = (*_TEXTS, *_QUANTITIES, "friction_length", "end_corrections")
 _BEAD_QUANTITIES = {
@@ -99,7 +102,7 @@ TYPE_KEYS = (
     Key("bending_model", Choice(tuple(BENDING_POTENTIALS)), None, "See `FilamentType`."),
     Key("stretching_model", Choice(tuple(STRETCHING_POTENTIALS)), None, "See `FilamentType`."),
     *(
-        Key(name, Quantity(unit, "zero" if name == "bending_rigidity" else "positive"), None, text)
+        Key(name, Quantity(unit, _SIGNS.get(name, "positive")), None, text)
         for name, (unit, text) in _QUANTITIES.items()
     ),
     Key(
