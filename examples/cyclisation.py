@@ -8,7 +8,7 @@ each spring (MBAR, Shirts and Chodera, J. Chem. Phys. 2008, 129, 124105). The st
     J = (k / 2 pi k_B T)^(3/2) exp(-F_k / k_B T).
 
 However stiff they are, springs do not shorten the step. But J depends on all of the energy that a loop costs, and so
-the step is the recommended one: in longer ones loops cost less, and at four times as much J comes out a tenth too large.
+the step is the recommended one: in longer ones loops cost less, and at four times the step J is a tenth too large.
 
     python cyclisation.py [folder] [steps]
 """

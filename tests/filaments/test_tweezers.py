@@ -120,6 +120,7 @@ def assert_as_in_monte_carlo(chain, rows):
 
 
 @pytest.mark.slow
+@pytest.mark.sample("plectoneme")
 @pytest.mark.parametrize(("chain", "coils"), [(STRAIGHT, 0.0), (PLECTONEME, 2.0)], ids=["straight", "plectoneme"])
 def test_extension_and_torque_are_those_of_monte_carlo(chain, coils):
     """In steps of 40 times the recommended one.
