@@ -60,7 +60,7 @@ from .kinetics.hand import Hand
 from .kinetics.hand_at_end import HandAtEnd
 from .kinetics.linker_table import LinkerTable
 from .kinetics.nucleation import Nucleation
-from .kinetics.presets import ALPHA_ACTININ, COHESIN, CONDENSIN, DYNEIN, FILAMIN, KINESIN_1, MYOSIN_II
+from .kinetics.presets import ALPHA_ACTININ, COHESIN, CONDENSIN, DYNEIN, FILAMIN, KINESIN_1, KINESIN_13, MYOSIN_II
 from .mechanics.flow import Flow
 from .mechanics.friction import EndCorrections, SegmentFriction, stokes_friction
 from .output.growth_reporter import GrowthReporter
@@ -125,6 +125,7 @@ __all__ = [
     "Hand",
     "Joints",
     "KINESIN_1",
+    "KINESIN_13",
     "LinkerReporter",
     "LinkerTable",
     "JointWarning",

@@ -34,6 +34,7 @@ from .severing import Severing
 
 _SAME_LENGTH = 1e-6
 """By what share the length of a segment may differ from that of its monomers."""
+_MOST_NODES = 1_000_000
 _MOST_MONOMERS_OF_SEGMENT = 100_000
 
 
@@ -246,8 +247,14 @@ def check_growth(
             f"{label}: it is {fewest * growth.monomers.length:g} nm long where it is shortest, which exceeds its "
             f"longest, {growth.longest:g} nm. Give its growth a shortest, or take shorter segments."
         )
+    nodes = growth.count_nodes(filament_type)
+    if nodes > _MOST_NODES:
+        raise InputError(
+            f"{label}: for its longest, {growth.longest:g} nm, it would need {nodes:,} nodes, of more than "
+            f"{_MOST_NODES:,}. Check the unit of longest, or take longer segments."
+        )
     if segments is None:
-        return growth.count_nodes(filament_type)
+        return nodes
     if growth.vanishes and tuple(clamped):
         raise InputError(f"{label} vanishes when it is short, so none of its nodes may be clamped.")
     length = segments * filament_type.segment_length
@@ -256,7 +263,7 @@ def check_growth(
             f"{label} is {length:g} nm long, but its growth has filaments between {fewest * growth.monomers.length:g} "
             f"and {growth.longest:g} nm."
         )
-    return max(0, growth.count_nodes(filament_type) - segments - 1)
+    return max(0, nodes - segments - 1)
 
 
 def _shortest_segment(filament_type, growth, fewest):

@@ -149,6 +149,10 @@ def place_linkers(
     force.setLinkers(list(range(count)), *rows, count)
 
 
+# Of hands that take monomers off an end.
+_ANY_NUMBER = 2**31 - 1
+
+
 def _add_hand(force, hand, filaments, name):
     every = [i for i, filament in enumerate(filaments) if hand.binds(filament.type)]
     chains = [i for i in every if filaments[i].takes_part]
@@ -188,10 +192,14 @@ def _set_hand_at_end(force, number, hand, growths, name):
     different = {id(growth): growth for growth in growths.values() if growth is not None}
     try:
         free, held = own.find_changes(different.values())
+        own.require_ends_that_shrink(different.values())
     except InputError as error:
         raise InputError(f"Linkers {name!r}: {error}") from None
     changed = [i for i, growth in growths.items() if growth is not None and own.may_change(growth)]
-    force.setHandAtEnd(number, int(own.end == "plus"), own.range, own.binds_there, own.tracks, free, held, changed)
+    end = ENDS_OF_RANGE.index(own.end)
+    force.setHandAtEnd(number, end, own.range, own.binds_there, own.tracks, free, held, changed)
+    unbinding = -1.0 if own.unbinding_rate is None else own.unbinding_rate
+    force.setHandRemoval(number, own.off_rate, own.sites or _ANY_NUMBER, unbinding)
 
 
 def _longest_contour(filament):

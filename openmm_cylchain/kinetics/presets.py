@@ -7,13 +7,15 @@ preset with other values is made by ``dataclasses.replace``.
 
 Papers
 ------
-Coppin, Pierce, Hsu, Vale, PNAS 1997, 94, 8539. Davidson et al., Science 2019, 366, 1338. Ferrer, Lee, Chen, Pelz,
-Nakamura, Kamm, Lang, PNAS 2008, 105, 9221. Ganji et al., Science 2018, 360, 102. Hansen et al., eLife 2017, 6, e25776.
-Kerssemakers, Howard, Hess, Diez, PNAS 2006, 103, 15812. Klumpp, Lipowsky, PNAS 2005, 102, 17284. Kuhlman, Ellis,
-Critchley, Bagshaw, FEBS Lett. 1994, 339, 297. Leduc et al., PNAS 2004, 101, 17096. Mallik, Carter, Lex, King, Gross,
-Nature 2004, 427, 649. Müller, Klumpp, Lipowsky, PNAS 2008, 105, 4609. Nakamura, Osborn, Hartemink, Hartwig, Stossel, J.
-Cell Biol. 2007, 179, 1011. Popov, Komianos, Papoian, PLoS Comput. Biol. 2016, 12, e1004877 (MEDYAN). Schnitzer,
-Visscher, Block, Nat. Cell Biol. 2000, 2, 718. Svoboda, Block, Cell 1994, 77, 773.
+Cooper, Wagenbach, Asbury, Wordeman, Nat. Struct. Mol. Biol. 2010, 17, 77. Coppin, Pierce, Hsu, Vale, PNAS 1997, 94,
+8539. Davidson et al., Science 2019, 366, 1338. Ferrer, Lee, Chen, Pelz, Nakamura, Kamm, Lang, PNAS 2008, 105, 9221.
+Ganji et al., Science 2018, 360, 102. Hansen et al., eLife 2017, 6, e25776. Helenius, Brouhard, Kalaidzidis, Diez,
+Howard, Nature 2006, 441, 115. Hunter et al., Mol. Cell 2003, 11, 445. Kerssemakers, Howard, Hess, Diez, PNAS 2006, 103,
+15812. Klumpp, Lipowsky, PNAS 2005, 102, 17284. Kuhlman, Ellis, Critchley, Bagshaw, FEBS Lett. 1994, 339, 297. Leduc et
+al., PNAS 2004, 101, 17096. Mallik, Carter, Lex, King, Gross, Nature 2004, 427, 649. Müller, Klumpp, Lipowsky, PNAS
+2008, 105, 4609. Nakamura, Osborn, Hartemink, Hartwig, Stossel, J. Cell Biol. 2007, 179, 1011. Popov, Komianos, Papoian,
+PLoS Comput. Biol. 2016, 12, e1004877 (MEDYAN). Schnitzer, Visscher, Block, Nat. Cell Biol. 2000, 2, 718. Svoboda,
+Block, Cell 1994, 77, 773.
 """
 
 from openmm import unit
@@ -21,6 +23,7 @@ from openmm import unit
 from ..filaments.presets import F_ACTIN, MICROTUBULE
 from .crosslinker import Crosslinker
 from .hand import Hand
+from .hand_at_end import HandAtEnd
 
 _NM = unit.nanometer
 _PN = unit.piconewton
@@ -150,6 +153,39 @@ Without anchors it is a complex of two of them, as KINESIN_1.
 - ``binding_rate`` is chosen: 1.6/s for a straight filament at the rest length.
 """
 
+KINESIN_13 = Crosslinker(
+    name="kinesin-13",
+    hands=[
+        Hand(binding_rate=0 / _S, reach=50 * _NM, unbinding_rate=0 / _S, binds_to=[MICROTUBULE]),
+        Hand(
+            binding_rate=30.5 / _S,
+            reach=50 * _NM,
+            unbinding_rate=1 / (0.83 * _S),
+            binds_to=[MICROTUBULE],
+            sliding_friction=4.116 * _PN * _NM / (0.38 * _UM**2 / _S),
+            filament_end=HandAtEnd(
+                end="both", range=8 * _NM, tracks=True, off_rate=1 / _S, sites=14, unbinding_rate=1 / (20 * _S)
+            ),
+        ),
+    ],
+    stiffness=0.3 * _PN / _NM,
+    rest_length=30 * _NM,
+)
+"""Kinesin-13, MCAK, with ATP at 25 C: it diffuses on microtubules that grow, stays at both ends, and takes tubulin off.
+
+- it diffuses with 0.38 um^2/s, and lets go after 0.83 s on average (Helenius et al. 2006): it slides 0.56 um.
+- it gets to an end with 54/(uM s), stays there for some 20 dimers, which it takes off at 1/s; there are up to 14 at an
+  end, one for each protofilament (Hunter et al. 2003): ``unbinding_rate`` 0.05/s at an end, and 14 ``sites``.
+- ``binding_rate`` is chosen: what binds within reach of an end slides there with these 54/(uM s), 96/(uM s) for each
+  micrometre of microtubule. That all of them come by sliding is an assumption; some come out of the solution (Cooper et
+  al. 2010).
+- that none leaves an end along the lattice, nor gets in the way of others, and that it takes as much off an end that
+  grows, or that a load pulls at, are assumptions. A dimer a second is little where 50 come and go; that it makes
+  catastrophes more frequent is another matter: ``changes`` of a ``HandAtEnd`` at plus ends.
+- range, stiffness and lengths are chosen, the latter as for KINESIN_1. The first hand binds to nothing; with
+  ``anchors``, as on a kinetochore, there is the second one alone.
+"""
+
 # One kilobase of DNA is 340 nm long.
 COHESIN = Crosslinker(
     name="cohesin",
@@ -207,6 +243,7 @@ PRESETS = {
     "MYOSIN_II": MYOSIN_II,
     "KINESIN_1": KINESIN_1,
     "DYNEIN": DYNEIN,
+    "KINESIN_13": KINESIN_13,
     "COHESIN": COHESIN,
     "CONDENSIN": CONDENSIN,
 }

@@ -3,6 +3,7 @@
 
 #include "couplings/Place.h"
 #include "mechanics/ChainList.h"
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -31,6 +32,10 @@ public:
     /** The length at which its plus end (1) or its minus end (0) is. */
     double getEnd(int chain, int end) const {
         return end == 1 ? chains[chain].begin+chains[chain].length : chains[chain].begin;
+    }
+    /** Whether a position on a chain is so near to an end. */
+    bool isNearEnd(int chain, double position, int end, double range) const {
+        return !isClosed(chain) && std::fabs(position-getEnd(chain, end)) <= range;
     }
     /** The length of a chain. */
     double getLength(int chain) const {

@@ -77,7 +77,7 @@ bool ChainGrowth::takeTurns(GrowthState& state, const GrowthStep& step, Group& g
         events.clear();
         for (int index : group.chains)
             if (state.ranges[index].size() > 0) {
-                ends.listEvents(state, index, events);
+                ends.listEvents(state, index, chains, events);
                 population.listEvents(state, index, chains, events);
             }
         for (int nucleator : group.nucleators)

@@ -36,13 +36,13 @@ void ChainPopulation::listEvents(const GrowthState& state, int index, const Chai
     if (own.vanishes && monomers <= own.leastMonomers) {
         double rate = 0;
         for (int end : {0, 1})
-            rate += own.ends[end].states[state.endStates[2*index+end]].offRate;
+            rate += own.ends[end].states[state.endStates[2*index+end]].offRate+chains.findOffRate(index, end);
         if (rate > 0)
             events.push_back({GrowthEvent::Vanish, index, rate});
     }
     if (own.severing.rate > 0)
         events.push_back({GrowthEvent::Sever, index, own.severing.rate*(monomers-1)});
-    chains.forSeveringHands(index, [&] (const SeveringHand& hand) {
+    chains.forHands(index, -1, [&] (const ActingHand& hand) {
         // One that is at an end, or where it has cut already, cuts no more.
         const int monomer = static_cast<int>(round(hand.position/shapes.getMonomerLength(index)));
         if (monomer <= state.ranges[index].first || monomer >= state.ranges[index].last)

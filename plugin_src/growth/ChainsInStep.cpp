@@ -68,9 +68,9 @@ void ChainsInStep::addCut(const ChainCut& cut, GrowthChanges& changes) {
     const auto found = hands.find(cut.chain);
     if (found == hands.end())
         return;
-    vector<SeveringHand> before;
+    vector<ActingHand> before;
     before.swap(found->second);
-    for (SeveringHand& hand : before) {
+    for (ActingHand& hand : before) {
         followCut(cut, hand);
         if (hand.chain >= 0)
             hands[hand.chain].push_back(hand);

@@ -21,7 +21,7 @@ public:
     ChainsInStep(const GrowthSystem& system, const GrowthStep& step, const ChainList& chains, const double* positions,
             const std::vector<Surroundings*>& around) : system(system), step(step), chains(chains),
             positions(positions), around(around), present(system.chains.size()) {
-        for (const SeveringHand& hand : step.severingHands)
+        for (const ActingHand& hand : step.hands)
             hands[hand.chain].push_back(hand);
     }
     const Chain& getChain(int index) const {
@@ -50,12 +50,22 @@ public:
     void set(int index, const std::vector<Vec3d>& nodes);
     /** Let what is beyond a length along a chain belong to another one, as others see it. */
     void move(int index, int other, double beyond);
-    /** Call a function of each hand that cuts a growing chain. */
-    template <class Function> void forSeveringHands(int index, Function function) const {
+    /** Call a function of each hand that cuts a growing chain, end -1, or takes monomers off an end. */
+    template <class Function> void forHands(int index, int end, Function function) const {
         const auto found = hands.find(system.chains[index].chain);
         if (found != hands.end())
-            for (const SeveringHand& hand : found->second)
-                function(hand);
+            for (const ActingHand& hand : found->second)
+                if (hand.end == end)
+                    function(hand);
+    }
+    /** Find how often hands take a monomer off an end of a growing chain, which a capped one keeps. */
+    double findOffRate(int index, int end) const {
+        double rate = 0;
+        if (!hands.empty() && system.chains[index].ends[end].grows())
+            forHands(index, end, [&] (const ActingHand& hand) {
+                rate += hand.rate;
+            });
+        return rate;
     }
     /** Take note of a cut. */
     void addCut(const ChainCut& cut, GrowthChanges& changes);
@@ -73,8 +83,8 @@ private:
     const double* positions;
     const std::vector<Surroundings*>& around;
     std::vector<Present> present;
-    /** Those that cut, by the numbers of chains. */
-    std::map<int, std::vector<SeveringHand> > hands;
+    /** By the numbers of chains. */
+    std::map<int, std::vector<ActingHand> > hands;
     /** Whether what is around has taken note of the step. */
     bool aroundIsKnown = false;
 };

@@ -20,7 +20,8 @@ MonomerRange findRange(const MonomerRange& before, const GrowthEvent& event) {
 
 } // namespace
 
-void EndGrowth::listEvents(const GrowthState& state, int index, vector<GrowthEvent>& events) const {
+void EndGrowth::listEvents(const GrowthState& state, int index, const ChainsInStep& chains,
+        vector<GrowthEvent>& events) const {
     const GrowingChain& own = system.chains[index];
     const MonomerPool& pool = system.pools[own.pool];
     const double concentration = pool.isClosed() ? state.free[own.pool]/pool.volume : pool.concentration;
@@ -31,7 +32,7 @@ void EndGrowth::listEvents(const GrowthState& state, int index, vector<GrowthEve
                 events.push_back({kind, index, rate, end, to, own.ends[end].timing.isRegular &&
                         kind != GrowthEvent::Switch});
         };
-        double gains = now.onRate*concentration, losses = now.offRate;
+        double gains = now.onRate*concentration, losses = now.offRate+chains.findOffRate(index, end);
         if (own.ends[end].timing.isRegular) {
             const double both = min(gains, losses);
             gains -= both;

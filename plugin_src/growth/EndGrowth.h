@@ -18,7 +18,8 @@ public:
     EndGrowth(const GrowthSystem& system, ChainShapes& shapes) : system(system), shapes(shapes) {
     }
     /** Add what may happen to the ends of a chain. */
-    void listEvents(const GrowthState& state, int index, std::vector<GrowthEvent>& events) const;
+    void listEvents(const GrowthState& state, int index, const ChainsInStep& chains,
+            std::vector<GrowthEvent>& events) const;
     /** Let an event happen at a time, unless energies or a lack of nodes are against it. */
     void apply(GrowthState& state, const GrowthEvent& event, double time, double kT, RandomNumbers& random,
             ChainsInStep& chains);

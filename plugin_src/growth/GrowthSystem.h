@@ -214,8 +214,8 @@ struct GrowthStep {
     /** The three vectors of the periodic box, and whether segments are their shortest images in it. */
     const double* box = nullptr;
     bool takesNearestImages = false;
-    /** Hands that cut. */
-    std::vector<SeveringHand> severingHands = {};
+    /** Hands that cut, or take monomers off ends. */
+    std::vector<ActingHand> hands = {};
     /** What cuts at its beginning, or nothing. */
     const CuttingPlane* plane = nullptr;
 };

@@ -37,15 +37,16 @@ void LinkerKinetics::findKinds(const KineticStep& step) {
             const Hand& hand = system.hands[type.hands[side]];
             const bool hops = hand.siteSpacing > 0 && hand.speed != 0;
             if ((held&(1<<side)) != 0) {
-                if (held != 3 || !type.mustStay(side))
-                    kind.rate += unbindingRate(hand, 0, 0);
+                const bool dependsOnPlace = hand.atEnd.unbindingRate >= 0;
+                if (!dependsOnPlace && (held != 3 || !type.mustStay(side)))
+                    kind.rate += unbindingRate(hand, HandPlace(), 0, 0);
                 kind.rate += hops ? fabs(hand.speed)/hand.siteSpacing : 0;
                 kind.slides = kind.slides || hand.slidingFriction > 0;
                 kind.walks = kind.walks || kind.slides || (hand.speed != 0 && !hops);
                 kind.velocity = hops ? 0 : hand.speed;
                 // A barrier may hold it.
                 const bool mayBeHeld = hand.speed != 0 && !system.barriers.empty();
-                known = known && !mayBeHeld &&
+                known = known && !mayBeHeld && !dependsOnPlace &&
                         (held != 3 || !(hand.isLoaded() || hops || (type.hasAngles() && type.reversible)));
             }
             else if (held != 0)

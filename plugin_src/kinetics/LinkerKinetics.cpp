@@ -17,9 +17,6 @@ const int MOST_NEW_LINKERS = 10000000;
 /** The random numbers of when linkers come out of a concentration belong to this, less the number of the type. */
 const uint32_t NEW_LINKERS = 0xffffffff;
 
-/** Of a length along a chain. */
-const double ROUNDING = 1e-9;
-
 uint64_t drawNumber() {
     static atomic<uint64_t> last(0);
     return ++last;
@@ -102,16 +99,14 @@ bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& 
             const HandPlace& old = held[side];
             if (!old.isBound() || contours.isClosed(old.chain))
                 continue;
-            const HandAtEnd& atEnd = system.hands[system.types[linker.type].hands[side]].atEnd;
-            const bool wasAtEnd = atEnd.tracks && fabs(place.position-before.getEnd(place.chain, atEnd.end)) <=
-                    ROUNDING*(1+fabs(place.position));
+            const int tracked = findTrackedEnd(system.hands[system.types[linker.type].hands[side]], place, before);
             if (isCut[old.chain] != 0)
                 for (const ChainCut& cut : cuts)
                     followCut(cut, place);
             if (!place.isBound() || contours.getLength(place.chain) == 0)
                 unbind(linker, side, nullptr, count);
-            else if (wasAtEnd)
-                place.position = contours.getEnd(place.chain, atEnd.end);
+            else if (tracked >= 0)
+                place.position = contours.getEnd(place.chain, tracked);
             else
                 stayOnChain(linker, side, count);
             any = any || place.chain != old.chain || place.position != old.position;
@@ -170,7 +165,8 @@ bool LinkerKinetics::draw(LinkerState& state, const KineticStep& step, Pending& 
         const Hand& hand = system.hands[number];
         if (linker.hands[side].isBound()) {
             if (!pulls || (!type.mustStay(side) && !staysByAngle))
-                add(Event::Unbind, side, 0, unbindingRate(hand, spring.energy, fabs(spring.force)));
+                add(Event::Unbind, side, 0, unbindingRate(hand, linker.hands[side], spring.energy,
+                        fabs(spring.force)));
             const Barrier* const barrier = heldBy(hand, linker.hands[side]);
             if (barrier != nullptr)
                 add(Event::LetGo, side, 0, barrier->releaseRate);

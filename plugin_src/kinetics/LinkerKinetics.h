@@ -168,14 +168,16 @@ private:
     double energyOf(const LinkerType& type, double distance) const;
     double reduced(double energy) const;
     double proposalRate(const Hand& hand) const;
-    double unbindingRate(const Hand& hand, double energy, double force) const;
+    double unbindingRate(const Hand& hand, const HandPlace& place, double energy, double force) const;
+    bool isAtItsEnd(const Hand& hand, const HandPlace& place) const;
+    static int findTrackedEnd(const Hand& hand, const HandPlace& place, const Contours& contours);
     double captureRate(const LinkerType& type, int side, const KineticStep& step) const;
     double pull(const Linker& linker, int side, const Spring& spring, const KineticStep& step, double& stiffness) const;
     double speedUnder(const Hand& hand, double pull) const;
     void slide(Linker& linker, const KineticStep& step, RandomNumbers& random, Count& count) const;
     void slideHand(Linker& linker, int side, const KineticStep& step, double duration, bool isShort,
             RandomNumbers& random, Count& count) const;
-    void slideFreely(HandPlace& place, double move, bool isHeld) const;
+    void slideFreely(const Hand& hand, HandPlace& place, double variance, double noise, double level) const;
     Slope slopeAt(const Linker& linker, int side, const KineticStep& step, double duration,
             bool isShort) const;
     void walk(Linker& linker, const KineticStep& step, RandomNumbers& random, Count& count) const;

@@ -11,6 +11,8 @@ namespace {
 
 /** Exponents of rates are at most this. */
 const double LARGEST_EXPONENT = 500;
+/** Of lengths along a chain: the share of one. */
+const double ROUNDING = 1e-9;
 /** Hands do not pass where a load on chains that stand still would stop them: in at most so many parts of a step. */
 const double MOST_PARTS = 100;
 
@@ -56,8 +58,26 @@ double LinkerKinetics::reduced(double energy) const {
     return energy > 0 ? energy/system.kT : 0;
 }
 
-double LinkerKinetics::unbindingRate(const Hand& hand, double energy, double force) const {
-    double rate = hand.unbindingRate;
+/** Whether a hand is so near to an end of its chain with which it has to do. */
+bool LinkerKinetics::isAtItsEnd(const Hand& hand, const HandPlace& place) const {
+    const double range = hand.atEnd.range;
+    return (hand.atEnd.isAt(0) && contours.isNearEnd(place.chain, place.position, 0, range)) ||
+            (hand.atEnd.isAt(1) && contours.isNearEnd(place.chain, place.position, 1, range));
+}
+
+/** The end at which a hand stays while that grows and shrinks, or -1. */
+int LinkerKinetics::findTrackedEnd(const Hand& hand, const HandPlace& place, const Contours& contours) {
+    const double rounding = ROUNDING*(1+fabs(place.position));
+    for (int end : {0, 1})
+        if (hand.atEnd.tracks && hand.atEnd.isAt(end) &&
+                contours.isNearEnd(place.chain, place.position, end, rounding))
+            return end;
+    return -1;
+}
+
+double LinkerKinetics::unbindingRate(const Hand& hand, const HandPlace& place, double energy, double force) const {
+    const bool isThere = hand.atEnd.unbindingRate >= 0 && isAtItsEnd(hand, place);
+    double rate = isThere ? hand.atEnd.unbindingRate : hand.unbindingRate;
     if (hand.unbindingForce > 0)
         rate *= boundedExp(force/hand.unbindingForce);
     else if (hand.strainShare > 0)
@@ -200,7 +220,7 @@ void LinkerKinetics::stayOnChain(Linker& linker, int side, Count& count) const {
 /** Whether a hand that would move to a place beyond an end stays on the chain. */
 bool LinkerKinetics::staysBeyond(const Hand& hand, const HandPlace& place) const {
     return hand.holdsAtEnds || (hand.atEnd.tracks &&
-            hand.atEnd.end == (place.position > contours.getEnd(place.chain, 1) ? 1 : 0));
+            hand.atEnd.isAt(place.position > contours.getEnd(place.chain, 1) ? 1 : 0));
 }
 
 uint64_t LinkerKinetics::siteOf(const Hand& hand, const HandPlace& place) const {
@@ -225,10 +245,11 @@ bool LinkerKinetics::toSite(const Hand& hand, HandPlace& place) const {
 
 /** Bring a hand to the end of its chain; false if it is not near to it. */
 bool LinkerKinetics::toEnd(const Hand& hand, HandPlace& place) const {
-    const double end = contours.getEnd(place.chain, hand.atEnd.end);
-    if (fabs(place.position-end) > hand.atEnd.range)
+    if (!isAtItsEnd(hand, place))
         return false;
-    place.position = end;
+    const double begin = contours.getBegin(place.chain), middle = begin+0.5*contours.getLength(place.chain);
+    const int either = place.position > middle ? 1 : 0;
+    place.position = contours.getEnd(place.chain, hand.atEnd.end == 2 ? either : hand.atEnd.end);
     return true;
 }
 

@@ -13,15 +13,23 @@ namespace cylchain {
 
 /** What a hand has to do with an end of chains that grow. */
 struct HandAtEnd {
-    /** The plus end (1) or the minus end (0), or -1 for none, and how near to it counts as there. */
+    /** The plus end (1), the minus end (0), or either (2), or -1 for none, and how near to it counts as there. */
     int end = -1;
     double range = 0;
-    /** Whether it binds there alone, and whether it stays there while the end grows. */
+    bool isAt(int one) const {
+        return end == one || end == 2;
+    }
+    /** Whether it binds there alone, and whether it stays there while the end grows, once it has come. */
     bool bindsThere = false, tracks = false;
     /** The state that an end changes to while it is there, from another one; -1 if it changes none. */
     int freeState = -1, heldState = -1;
     /** The chains the ends of which it changes. */
     std::vector<int> changes = {};
+    /** The rate at which it takes monomers off an end, and how many of them do so at most. */
+    double offRate = 0;
+    int sites = std::numeric_limits<int>::max();
+    /** The rate of unbinding there without load, or -1 if it is that of the hand. */
+    double unbindingRate = -1;
 };
 
 /** The part of a chain to which a hand binds: what is near to an end, or all else. */
@@ -177,10 +185,12 @@ template <class AlongChain> void followCut(const ChainCut& cut, AlongChain& plac
         place.chain = cut.part;
 }
 
-/** A hand that cuts the chain to which it is bound: where it is, and its rate in 1/ps. */
-struct SeveringHand {
+/** A hand that cuts the chain to which it is bound, or takes monomers off an end: where it is, its rate in 1/ps. */
+struct ActingHand {
     int chain;
     double position, rate;
+    /** The end, or -1 if it cuts. */
+    int end;
 };
 
 /** A linker. */

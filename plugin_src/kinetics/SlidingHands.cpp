@@ -50,10 +50,28 @@ void LinkerKinetics::slide(Linker& linker, const KineticStep& step, RandomNumber
                 slideHand(linker, side, step, step.stepSize/parts, false, random, count);
 }
 
-/** A hand slides along its chain at random, without a load; it comes back from ends, unless it lets go there. */
-void LinkerKinetics::slideFreely(HandPlace& place, double move, bool isHeld) const {
-    place.position += move;
-    if (!isHeld || contours.isClosed(place.chain))
+/**
+ * A hand slides along its chain at random, without a load. It stays at an end that it tracks, and comes back from
+ * others, or lets go there.
+ *
+ * @param noise  a normal variate
+ * @param level  an exponential variate
+ */
+void LinkerKinetics::slideFreely(const Hand& hand, HandPlace& place, double variance, double noise,
+        double level) const {
+    const double before = place.position;
+    place.position += sqrt(variance)*noise;
+    if (contours.isClosed(place.chain))
+        return;
+    for (int end : {0, 1}) {
+        const double at = contours.getEnd(place.chain, end);
+        // A Brownian bridge from a to b has been at zero with the probability exp(-2ab/variance).
+        if (hand.atEnd.tracks && hand.atEnd.isAt(end) && 2*(at-before)*(at-place.position) < level*variance) {
+            place.position = at;
+            return;
+        }
+    }
+    if (!hand.holdsAtEnds)
         return;
     const double length = contours.getLength(place.chain), begin = contours.getBegin(place.chain);
     double along = place.position-begin;
@@ -88,8 +106,10 @@ void LinkerKinetics::slideHand(Linker& linker, int side, const KineticStep& step
         bool isShort, RandomNumbers& random, Count& count) const {
     const Hand& hand = system.hands[system.types[linker.type].hands[side]];
     const double noise = drawNormal(random), accepted = random.exponential();
+    if (findTrackedEnd(hand, linker.hands[side], contours) >= 0)
+        return;
     if (!linker.isHeld(1-side)) {
-        slideFreely(linker.hands[side], sqrt(2*system.kT*duration/hand.slidingFriction)*noise, hand.holdsAtEnds);
+        slideFreely(hand, linker.hands[side], 2*system.kT*duration/hand.slidingFriction, noise, accepted);
         stayOnChain(linker, side, count);
         return;
     }
@@ -100,7 +120,10 @@ void LinkerKinetics::slideHand(Linker& linker, int side, const KineticStep& step
     place.position += move;
     if (!contours.isClosed(place.chain) && !contours.isWithin(place.chain, place.position)) {
         // Beyond an end there is nothing.
-        if (!staysBeyond(hand, place))
+        const int end = place.position > contours.getEnd(place.chain, 1) ? 1 : 0;
+        if (hand.atEnd.tracks && hand.atEnd.isAt(end))
+            linker.hands[side].position = contours.getEnd(place.chain, end);
+        else if (!staysBeyond(hand, place))
             unbind(linker, side, nullptr, count);
         return;
     }

@@ -17,8 +17,11 @@ const int MOST_PARTS_OF_GAPS = 32;
 const int MOST_SWEEPS = 2000;
 /** How often those that are pushed are gone through before all are again. */
 const int SWEEPS_OF_PUSHED = 50;
-/** The share of what others push a gap open by that counts at the start of a part. */
-const double SHARE_AT_START = 1.0/3;
+/**
+ * The share of what others push a gap open by that counts at the start of a part; and that of what they push it shut
+ * by, over the square of their correlation, which counts there the other way round. Both are fitted to equilibria.
+ */
+const double SHARE_OF_OPENING = 1.0/3, SHARE_OF_CLOSING = 0.4;
 /** What sweeps may leave to change of a gap, and the last iteration may change, over the thermal scale. */
 const double OF_SWEEPS = 0.01, OF_ITERATIONS = 0.03;
 /** Gaps that end farther than this from where the equations have led them have turned: others keep their responses. */
@@ -191,19 +194,22 @@ double ReflectedGaps::findPush(int i, int part) const {
     const double end = gap.end+one.all+other.all-gap.ofChains*gap.push;
     if (!gap.isReflected)
         return findPushOfSpring(i, part, end);
-    const double opening = one.opening+other.opening-gap.ofChains*gap.push;
-    return reflect(gap.start+SHARE_AT_START*opening, end, gap.response, gap.ofChains, gap.variate);
+    return reflect(gap.start+one.atStart+other.atStart, end, gap.response, gap.ofChains, gap.variate);
 }
 
 /** Let a force on a gap move all ports of its chains. */
-void ReflectedGaps::move(int i, double push, bool opens) {
+void ReflectedGaps::move(int i, double push, bool reflects) {
     responses.forPorts(i, [&] (const GapResponses::ChainPorts& chain, int port) {
         const double* const row = chain.responsesOf(port);
         MotionOfPort* const to = &motions[chain.first];
         for (int k = 0; k < chain.count(); k++) {
             const double way = push*row[k];
             to[k].all += way;
-            to[k].opening += opens && row[k] > 0 ? way : 0;
+            const int other = chain.ports[k].gap;
+            if (!reflects || other == i || row[k] == 0)
+                continue;
+            const double both = inPart[i].ofChains*inPart[other].ofChains;
+            to[k].atStart += row[k] > 0 ? SHARE_OF_OPENING*way : -SHARE_OF_CLOSING*min(1.0, row[k]*row[k]/both)*way;
         }
     });
 }

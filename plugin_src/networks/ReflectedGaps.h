@@ -27,7 +27,9 @@ namespace cylchain {
  *
  * with an exponential variate E of mean one. Gaps that share chains are found in parts of the step: in each, the ends
  * move on by a share of b-a and by a bridge of Brownian motion with the covariance 2 k_B T G, and every gap takes the
- * law of one, with what others push in this part whole at its end and, where it opens the gap, by a third at its start.
+ * law of one, with what others push in this part whole at its end and by a share at its start: what opens the gap by a
+ * third; and what closes it the other way round, by 0.4 times the square of the correlation of both, since one is
+ * pushed while the other one is open.
  * Gaps that move together have variates E that are correlated as their motion is: those that move as one are reflected
  * as one. With one gap on each chain, all this is exact. Going through the gaps in turn finds the forces of a part;
  * threads do so at once with gaps that share no chain.
@@ -76,7 +78,7 @@ private:
     void findPushesOfPart(int part, const Loop& loop);
     double findPush(int gap, int part) const;
     double findPushOfSpring(int gap, int part, double end) const;
-    void move(int gap, double push, bool opens);
+    void move(int gap, double push, bool reflects);
     double scaleOf(int gap) const;
     bool wouldPush(const Gap& gap) const;
     bool isTorn(int gap) const;
@@ -107,9 +109,9 @@ private:
     std::vector<GapInPart> inPart;
     /** All gaps, and those that are pushed in a part. */
     GapColors all, pushed;
-    /** How far forces move a port in a part, and those that open its gap alone. */
+    /** How far forces move a port in a part, and what of those on other gaps counts at its start. */
     struct MotionOfPort {
-        double all = 0, opening = 0;
+        double all = 0, atStart = 0;
     };
     std::vector<MotionOfPort> motions;
 };

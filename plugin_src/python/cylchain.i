@@ -122,7 +122,7 @@ static void raiseException(const std::exception& e) {
         int& particles, int& chain1, int& segment1, int& chain2, int& segment2, int& hand1, int& hand2,
         int& table, int& pool, int& firstMonomer, int& lastMonomer, int& leastMonomers, int& monomersPerSegment,
         int& initialState, int& minusState, int& plusState, int& order, int& monomers, int& region, int& nucleator,
-        int& end, int& freeState, int& heldState, int& direction};
+        int& end, int& freeState, int& heldState, int& direction, int& sites};
 
 %typemap(in, numinputs=0) Vec3& point (OpenMM::Vec3 value) {
     $1 = &value;
@@ -243,7 +243,7 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         double& bendingRigidity, double& shortening, double& rate, double& angle,
         double& distance, double& beyond, double& range, double& friction, double& diffusion, double& leastCosine,
         double& largestCosine, double& position, double& captureProbability, double& releaseRate,
-        double& torque, double& angularVelocity};
+        double& torque, double& angularVelocity, double& offRate};
 %apply bool& OUTPUT {bool& walksBackward, bool& holdsAtEnds, bool& sameChain, bool& vanishes, bool& isRegular,
         bool& bindsThere, bool& tracks, bool& planar, bool& excluded, bool& transActivated, bool& reversible};
 %apply long long& OUTPUT {long long& bindings, long long& unbindings};

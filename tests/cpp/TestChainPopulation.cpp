@@ -367,8 +367,8 @@ static void testSeveringHands() {
         // Two on each chain, of which one is at its end.
         GrowthStep step = {KT, 0.5, 9};
         for (int i = 0; i < number; i++) {
-            step.severingHands.push_back({i, isShort ? -2*MONOMER : 30*MONOMER+0.3, 1.5});
-            step.severingHands.push_back({i, -7*MONOMER, 1e3});
+            step.hands.push_back({i, isShort ? -2*MONOMER : 30*MONOMER+0.3, 1.5, -1});
+            step.hands.push_back({i, -7*MONOMER, 1e3, -1});
         }
         const long long free = all.state.free[0];
         const GrowthChanges changes = growth.advance(all.state, step, all.chains, all.x.data(), {});

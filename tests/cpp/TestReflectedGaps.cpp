@@ -309,6 +309,18 @@ static void testTwoGaps() {
     }
 }
 
+/** Two that push each other's gap shut nearly as far as they open their own: what is between two surfaces. */
+static void testOpposedGaps() {
+    const double cosine = -0.8, sine = 0.6;
+    for (double load : {0.7, 2.0}) {
+        const Surroundings surroundings = {{{{1, 0, 0}, 0}, {{cosine, sine, 0}, 0}},
+                {-load*(1+cosine), -load*sine, 0}, 0, load};
+        const Lattice lattice(surroundings, 40, 1600, false);
+        for (const Run& run : {Run {1.5, 16000, 32}, Run {3, 16000, 16}})
+            checkEquilibrium(surroundings, lattice, run, 0.05, "opposed planes with the load "+to_string(load));
+    }
+}
+
 /** Twelve gaps that share a particle: a narrow prism. */
 static void testTwelveGaps() {
     Surroundings surroundings = {{}, {-2, 0, 0}, 0, 0.9};
@@ -407,6 +419,6 @@ static void testColors() {
 }
 
 int main() {
-    return runTests({testHardSurfaces, testOneGap, testSprings, testTwoGaps, testCold, testOverlaps, testColors},
-            {testTwelveGaps});
+    return runTests({testHardSurfaces, testOneGap, testSprings, testTwoGaps, testOpposedGaps, testCold, testOverlaps,
+            testColors}, {testTwelveGaps});
 }

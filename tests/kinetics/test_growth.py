@@ -158,6 +158,7 @@ def test_monomers_of_wrong_values(name, value):
         (lambda: Monomers(length=2.7).treadmilling_concentration, "never grow"),
         (lambda: growing(growth=ACTIN_ATP), "growth"),
         (lambda: growing(growth=growth(longest=200.0)), "216 nm long, but its growth has filaments between"),
+        (lambda: growing(growth=growth(longest=1 * unit.meter)), "Check the unit of longest"),
         (lambda: growing(growth=growth(shortest=300.0)), "216 nm long, but its growth has filaments between"),
         (lambda: growing(kind=F_ACTIN.with_segment_length(55.0)), r"with_segment_length\(54\)"),
         (lambda: growing(clamped=0), "minus_capped=True"),

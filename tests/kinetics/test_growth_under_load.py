@@ -150,3 +150,54 @@ def test_rods_that_propel_themselves_against_a_wall_grow_until_they_push_with_th
     expected = np.average(numbers, weights=weights)
     assert 4.0 * error < 0.04 * expected
     assert abs(means.mean() - expected) < 4.0 * error
+
+
+def speeds_of_rods_between_a_wall_and_an_obstacle(load, seed, diffusion, step, copies=60, duration=1000.0):
+    """Rods that slide along cylinders, behind them a wall and before them spheres, as large as planes, under a load."""
+    filaments = Filaments(1.0 * unit.pascal * unit.second, TEMPERATURE)
+    rod = FilamentType(
+        name="ROD", diameter=7.0, bending_rigidity=1e9 * KT, stretching_modulus=1e6, segment_length=PER_SEGMENT * DELTA
+    )
+    friction = 4 * rod.segment_friction(filaments.viscosity, TEMPERATURE, 1).parallel
+    rate, length, sphere, diameter = KT / friction / diffusion / DELTA**2, 4 * PER_SEGMENT * DELTA, 6000.0, 30.0
+    monomers = Monomers(length=DELTA, plus_on_rate=rate, plus_off_rate=OFF_RATE * rate)
+    growth = Growth(monomers=monomers, pool=1.0, longest=10 * length, shortest=173.0, minus_capped=True)
+    apart = 1.5 * sphere * np.arange(copies)
+    for y in apart:
+        filaments.add_straight(rod, 4, [0, y, 0], [1, 0, 0], growth=growth)
+    _, system, positions = filaments.build()
+    spheres = [system.addParticle(1.0) for _ in apart]
+    gaps = np.random.default_rng(seed).exponential(DELTA / load, copies)
+    centres = np.stack([length + 0.5 * (sphere + diameter) + gaps, apart, 0.0 * gaps], axis=1)
+    positions = np.concatenate([positions._value, centres])
+    pressed = openmm.CustomExternalForce("load*x+0.5*stiffness*((y-y0)^2+z^2)")
+    pressed.addGlobalParameter("load", load * KT / DELTA)
+    pressed.addGlobalParameter("stiffness", friction * diffusion * rate / step / 20.0)
+    pressed.addPerParticleParameter("y0")
+    for particle, y in zip(spheres, apart):
+        pressed.addParticle(particle, [y])
+    system.addForce(pressed)
+    stiffness, obstacles = 4.0 * KT / DELTA**2, {"particles": spheres, "particle_diameter": sphere}
+    system.addForce(capsule_contact_force(filaments, system, diameter, stiffness, **obstacles))
+    system.addForce(filament_wall_force(filaments, system, Plane([0, 0, 0], [1, 0, 0]), stiffness))
+    for number, y in enumerate(apart):
+        tube = Cylinder([0, y, 0], [1, 0, 0], 8.0)
+        system.addForce(filament_wall_force(filaments, system, tube, 0.5 * KT, numbers=[number]))
+    options = {"random_seed": seed, "checks": False, "particle_friction": friction * diffusion}
+    integrator = filaments.create_integrator(system, step / rate, **options)
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("CPU"), {"Threads": "1"})
+    context.setPositions(positions)
+    here, steps = filaments.in_context(context), round(duration / step)
+    integrator.step(steps // 10)
+    before = here.growth().monomers
+    integrator.step(steps)
+    return (here.growth().monomers - before)[:, 1] / duration
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [0.2, 0.05])
+def test_rods_that_are_pressed_at_both_ends_stall_at_the_force_of_theory(step):
+    """Nothing holds the rod but two contacts: one pushes the other one shut."""
+    load, error = stall(lambda load, seed: speeds_of_rods_between_a_wall_and_an_obstacle(load, seed, 1.0, step))
+    assert 4.0 * error < 0.035
+    assert abs(load - 1.0) < 4.0 * error

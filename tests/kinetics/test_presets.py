@@ -13,6 +13,7 @@ from openmm_cylchain import (
     F_ACTIN,
     FILAMIN,
     KINESIN_1,
+    KINESIN_13,
     MICROTUBULE,
     MYOSIN_II,
     Filaments,
@@ -28,8 +29,8 @@ PN = 0.602214076  # kJ/(mol nm)
 PER_SECOND = 1e-12
 
 
-# Hands of others load as pairs; test_loop_extruders.py has them.
-ONE_BY_ONE = [name for name, kind in PRESETS.items() if kind.loading_distance is None]
+# Hands of others load as pairs, or slide to ends: test_loop_extruders.py and test_depolymerases.py have them.
+ONE_BY_ONE = [name for name, kind in PRESETS.items() if kind.loading_distance is None and kind != KINESIN_13]
 
 
 def rate_for_straight_filament(kind, distance):

@@ -5,7 +5,16 @@ import json
 import numpy as np
 import pytest
 
-from openmm_cylchain import ACTIN_ATP, MDIA1_ENDS, DynamicInstability, HandAtEnd, InputError, TwoUnitCap, analysis
+from openmm_cylchain import (
+    ACTIN_ATP,
+    KINESIN_13,
+    MDIA1_ENDS,
+    DynamicInstability,
+    HandAtEnd,
+    InputError,
+    TwoUnitCap,
+    analysis,
+)
 from openmm_cylchain.cli import main
 from openmm_cylchain.output.read_tables import read_reports
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration
@@ -345,6 +354,36 @@ threads = 1
 checks = false
 """
 )
+
+
+MICROTUBULES = """[[filament]]
+type = "MICROTUBULE"
+segment_length = "800 nm"
+segments = 3
+count = 3
+growth = { longest = "3 um", monomers = "TUBULIN" }
+"""
+DEPOLYMERASE = """[[linkers]]
+type = "KINESIN_13"
+concentration = "1 uM"
+"""
+
+
+def test_kinesin_13_in_a_run(tmp_path):
+    monomers = MONOMERS.replace("ACTIN_ATP", "TUBULIN").replace("5 uM", "0 uM")
+    text = HEAD + monomers + MICROTUBULES + DEPOLYMERASE + TAIL
+    assert parse_configuration(text).linkers[0].kind == KINESIN_13
+    at_end = 'filament_end = { end = "both", range = "8 nm", tracks = true, off_rate = "2 1/s", sites = 3, '
+    changed = f'[[linkers.hands]]\n[[linkers.hands]]\n{at_end}unbinding_rate = "0.1 1/s" }}\n'
+    still, sliding = parse_configuration(text.replace(DEPOLYMERASE, DEPOLYMERASE + changed)).linkers[0].kind.hands
+    assert still == KINESIN_13.hands[0] and sliding.sliding_friction == KINESIN_13.hands[1].sliding_friction
+    own = sliding.filament_end
+    assert per_second([own.off_rate, own.unbinding_rate]) == pytest.approx([2.0, 0.1]) and own.sites == 3
+    (tmp_path / "run.toml").write_text(text)
+    assert main(["run", str(tmp_path / "run.toml"), "--output", str(tmp_path / "out")]) == 0
+    lost = analysis.load(tmp_path / "out").growth["minus end lost (monomers)"][-1]
+    # 23 per s leave by themselves; 54 come to an end per second then.
+    assert 0 < lost.sum() < 40
 
 
 def test_shares_of_time_in_states(tmp_path):

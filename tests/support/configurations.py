@@ -384,6 +384,9 @@ filament_end = { end = "plus", range = "20 nm", binds_there = true, tracks = tru
 binding_rate = "0 1/s"
 reach = "50 nm"
 unbinding_rate = "0 1/s"
+[[linkers]]
+type = "KINESIN_13"
+concentration = "0.2 uM"
 [[tether]]
 table = 1
 node = 0

@@ -7,7 +7,6 @@ import numpy as np
 
 from ...couplings.wall_points import random_points_on
 from ...errors import InputError
-from ...filaments.end_states import ENDS
 from ...kinetics.binding_range import ENDS_OF_RANGE, BindingRange
 from ...kinetics.crosslinker import Crosslinker
 from ...kinetics.hand import AT_ENDS, Hand
@@ -85,10 +84,13 @@ _AT_END_EXAMPLE = (
 _AT_END = TableKind(
     "filament_end",
     (
-        Key("end", Choice(ENDS), REQUIRED, "Which one."),
+        Key("end", Choice(ENDS_OF_RANGE), REQUIRED, "Which one."),
         Key("range", Quantity(units.LENGTH), REQUIRED, "How near to it a hand counts as there."),
         Key("binds_there", Flag(), False, "Whether it binds there alone, and is at the end itself then."),
-        Key("tracks", Flag(), False, "Whether it stays at the end while that grows and shrinks."),
+        Key("tracks", Flag(), False, "Whether it stays at the end while that grows and shrinks, once it is there."),
+        Key("off_rate", Quantity(units.RATE, "zero"), None, "At which it takes monomers off the end, if given."),
+        Key("sites", Whole(1, None, "14"), None, "How many of its kind do so at a time at an end, at most."),
+        Key("unbinding_rate", Quantity(units.RATE, "zero"), None, "That of a hand there; its own if not given."),
         Key(
             "changes",
             Listing(Text('"free"'), "two names of states", '["free", "with formin"]', 2),

@@ -369,14 +369,21 @@ void CylinderChainBindingForce::setLinkers(const vector<int>& numbers, const vec
 void CylinderChainBindingForce::setHandAtEnd(int hand, int end, double range, bool bindsThere, bool tracks,
         int freeState, int heldState, const vector<int>& numbers) {
     const bool changes = freeState >= 0 && heldState >= 0;
-    if (end < -1 || end > 1 || !(range >= 0 && range < HUGE_VAL) || (end == -1 && (bindsThere || tracks || changes)) ||
+    if (end < -1 || end > 2 || (end == 2 && changes) || !(range >= 0 && range < HUGE_VAL) ||
+            (end == -1 && (bindsThere || tracks || changes)) ||
             (freeState >= 0) != (heldState >= 0) || (changes && freeState == heldState) ||
             changes == numbers.empty() || any_of(numbers.begin(), numbers.end(), [] (int chain) {return chain < 0;}))
         throw OpenMMException("CylinderChainBindingForce: A kind of hands needs an end, a range that is not negative, "
                 "and two different states of ends of some chains or none");
-    handOf(hand).atEnd = {end, range, bindsThere, tracks, freeState, heldState, numbers};
-    vector<int>& chains = handOf(hand).atEnd.changes;
-    sort(chains.begin(), chains.end());
+    cylchain::HandAtEnd& own = handOf(hand).atEnd;
+    own.end = end;
+    own.range = range;
+    own.bindsThere = bindsThere;
+    own.tracks = tracks;
+    own.freeState = freeState;
+    own.heldState = heldState;
+    own.changes = numbers;
+    sort(own.changes.begin(), own.changes.end());
 }
 
 void CylinderChainBindingForce::getHandAtEnd(int hand, int& end, double& range, bool& bindsThere, bool& tracks,
@@ -389,6 +396,25 @@ void CylinderChainBindingForce::getHandAtEnd(int hand, int& end, double& range, 
     freeState = own.freeState;
     heldState = own.heldState;
     numbers = own.changes;
+}
+
+void CylinderChainBindingForce::setHandRemoval(int hand, double offRate, int sites, double unbindingRate) {
+    cylchain::HandAtEnd& own = handOf(hand).atEnd;
+    if (!(offRate >= 0 && offRate < HUGE_VAL) || sites < 1 ||
+            !(unbindingRate == -1 || (unbindingRate >= 0 && unbindingRate < HUGE_VAL)) ||
+            (own.end < 0 && (offRate > 0 || unbindingRate >= 0)))
+        throw OpenMMException("CylinderChainBindingForce: A kind of hands that takes monomers off ends needs an end, "
+                "rates that are not negative and finite, and sites at an end");
+    own.offRate = offRate;
+    own.sites = sites;
+    own.unbindingRate = unbindingRate;
+}
+
+void CylinderChainBindingForce::getHandRemoval(int hand, double& offRate, int& sites, double& unbindingRate) const {
+    const cylchain::HandAtEnd& own = getHand(hand).atEnd;
+    offRate = own.offRate;
+    sites = own.sites;
+    unbindingRate = own.unbindingRate;
 }
 
 double CylinderChainBindingForce::getHandSevering(int hand) const {

@@ -18,7 +18,9 @@
 #include "openmm/reference/SimTKOpenMMRealType.h"
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
+#include <tuple>
 
 using namespace OpenMM;
 using namespace std;
@@ -318,20 +320,27 @@ void CylinderChainBindingForceImpl::findHeldEnds(vector<cylchain::HeldEnd>& ends
     forBoundHands([&] (const cylchain::Hand& hand, const cylchain::HandPlace& place) {
         const cylchain::HandAtEnd& own = hand.atEnd;
         if (own.heldState >= 0 && binary_search(own.changes.begin(), own.changes.end(), place.chain) &&
-                fabs(place.position-contours->getEnd(place.chain, own.end)) <= own.range)
+                contours->isNearEnd(place.chain, place.position, own.end, own.range))
             ends.push_back({place.chain, own.end, own.freeState, own.heldState});
     });
 }
 
-void CylinderChainBindingForceImpl::findSeveringHands(vector<cylchain::SeveringHand>& hands) {
-    const bool anyCuts = any_of(system.hands.begin(), system.hands.end(), [] (const cylchain::Hand& hand) {
-        return hand.severingRate > 0;
+void CylinderChainBindingForceImpl::findActingHands(vector<cylchain::ActingHand>& hands) {
+    const bool anyActs = any_of(system.hands.begin(), system.hands.end(), [] (const cylchain::Hand& hand) {
+        return hand.severingRate > 0 || hand.atEnd.offRate > 0;
     });
-    if (anyCuts)
-        forBoundHands([&] (const cylchain::Hand& hand, const cylchain::HandPlace& place) {
-            if (hand.severingRate > 0)
-                hands.push_back({place.chain, place.position, hand.severingRate});
-        });
+    if (!anyActs)
+        return;
+    map<tuple<const cylchain::Hand*, int, int>, int> taken;
+    forBoundHands([&] (const cylchain::Hand& hand, const cylchain::HandPlace& place) {
+        if (hand.severingRate > 0)
+            hands.push_back({place.chain, place.position, hand.severingRate, -1});
+        if (hand.atEnd.offRate > 0)
+            for (int end : {0, 1})
+                if (hand.atEnd.isAt(end) && contours->isNearEnd(place.chain, place.position, end, hand.atEnd.range) &&
+                        taken[make_tuple(&hand, place.chain, end)]++ < hand.atEnd.sites)
+                    hands.push_back({place.chain, place.position, hand.atEnd.offRate, end});
+    });
 }
 
 /** Hold chains that have begun as branches, where both are still there at the end of the step. */

@@ -210,7 +210,7 @@ void CylinderChainGrowthForceImpl::updateContextState(ContextImpl& context, bool
         return;
     GrowthStep step = {getThermalEnergy(), size, seed};
     for (CouplingForceImpl* coupling : couplings)
-        coupling->findSeveringHands(step.severingHands);
+        coupling->findActingHands(step.hands);
     forcesInvalid |= !grow(step).chains.empty();
 }
 

@@ -25,7 +25,9 @@ static void write(const CylinderChainBindingForce& force, SerializationNode& nod
         const cylchain::HandAtEnd& atEnd = hand.atEnd;
         child.setIntProperty("end", atEnd.end).setDoubleProperty("endRange", atEnd.range)
                 .setBoolProperty("bindsAtEnd", atEnd.bindsThere).setBoolProperty("tracksEnd", atEnd.tracks)
-                .setIntProperty("freeState", atEnd.freeState).setIntProperty("heldState", atEnd.heldState);
+                .setIntProperty("freeState", atEnd.freeState).setIntProperty("heldState", atEnd.heldState)
+                .setDoubleProperty("offRate", atEnd.offRate).setIntProperty("sitesAtEnd", atEnd.sites)
+                .setDoubleProperty("unbindingRateAtEnd", atEnd.unbindingRate);
         child.setDoubleProperty("slidingFriction", hand.slidingFriction)
                 .setIntProperty("rangeEnd", hand.bindingRange.end)
                 .setDoubleProperty("bindingRange", hand.bindingRange.range)
@@ -103,6 +105,8 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
         force->setHandAtEnd(number, hand.getIntProperty("end"), hand.getDoubleProperty("endRange"),
                 hand.getBoolProperty("bindsAtEnd"), hand.getBoolProperty("tracksEnd"),
                 hand.getIntProperty("freeState"), hand.getIntProperty("heldState"), withEnds);
+        force->setHandRemoval(number, hand.getDoubleProperty("offRate"), hand.getIntProperty("sitesAtEnd"),
+                hand.getDoubleProperty("unbindingRateAtEnd"));
         force->setHandSliding(number, hand.getDoubleProperty("slidingFriction"));
         force->setHandBindingRange(number, hand.getIntProperty("rangeEnd"), hand.getDoubleProperty("bindingRange"),
                 hand.getBoolProperty("rangeExcluded"));

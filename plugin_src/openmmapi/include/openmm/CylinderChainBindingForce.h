@@ -137,10 +137,12 @@ public:
      * Set what a kind of hands has to do with an end of chains that grow.
      *
      * @param hand        the index of the kind
-     * @param end         the plus end (1) or the minus end (0), or -1 for none
+     * @param end         the plus end (1), the minus end (0), or either (2), of which it changes no states; or -1 for
+     *                    none
      * @param range       how near to the end counts as there, measured in nm
      * @param bindsThere  whether it binds there alone, and comes to the end itself then
-     * @param tracks      whether one that is at the end stays there while the end grows and shrinks
+     * @param tracks      whether one that is at the end stays there while the end grows and shrinks, and does not
+     *                    slide away
      * @param freeState   the state of ends that it changes, see CylinderChainGrowthForce::setEndStates(), or -1
      * @param heldState   the state that these have while it is there, or -1
      * @param numbers     the chains the ends of which it changes
@@ -161,6 +163,18 @@ public:
     void setHandBindingRange(int hand, int end, double range, bool excluded);
     /** Get to which part of filaments a kind of hands binds, see setHandBindingRange(). */
     void getHandBindingRange(int hand, int& end, double& range, bool& excluded) const;
+    /** Get how hands of a kind take monomers off ends, see setHandRemoval(). */
+    void getHandRemoval(int hand, double& offRate, int& sites, double& unbindingRate) const;
+    /**
+     * Let hands of a kind take monomers off the end with which they have to do, see setHandAtEnd(), while they are
+     * there. An end that neither gains nor loses monomers by itself keeps them.
+     *
+     * @param hand           the index of the kind
+     * @param offRate        how often each of them does so, measured in 1/ps
+     * @param sites          how many of them do so at most at an end
+     * @param unbindingRate  how often they unbind there without load, measured in 1/ps, or -1 if as often as elsewhere
+     */
+    void setHandRemoval(int hand, double offRate, int sites, double unbindingRate);
     /** Get the friction of hands of a kind that slide, measured in kJ ps/mol/nm^2, or 0 if they do not. */
     double getHandSliding(int hand) const;
     /**

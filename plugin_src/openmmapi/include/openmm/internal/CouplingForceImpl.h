@@ -106,7 +106,7 @@ public:
     /**
      * Add its hands that cut chains.
      */
-    virtual void findSeveringHands(std::vector<cylchain::SeveringHand>&) {
+    virtual void findActingHands(std::vector<cylchain::ActingHand>&) {
     }
     /**
      * Describe it as the ends of chains feel it that grow; NULL if it cannot act on them.

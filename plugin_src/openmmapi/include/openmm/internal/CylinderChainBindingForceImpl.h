@@ -59,7 +59,7 @@ public:
     }
     void findHeldEnds(std::vector<cylchain::HeldEnd>& ends);
     void findChangesOfEnds(std::vector<cylchain::HeldEnd>& ends) const;
-    void findSeveringHands(std::vector<cylchain::SeveringHand>& hands);
+    void findActingHands(std::vector<cylchain::ActingHand>& hands);
     void chainsHaveGrown(ContextImpl& context, const cylchain::ChainList& chains,
             const cylchain::GrowthChanges& changes);
     std::unique_ptr<cylchain::Surroundings> describeSurroundings(const cylchain::ChainList& chains,
