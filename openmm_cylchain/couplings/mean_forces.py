@@ -122,8 +122,8 @@ def wall_forces(context: openmm.Context) -> list[WallForces]:
     case it is what has moved the filaments: in equilibrium, it balances what presses on them. Checkpoints hold the
     sums, so that a run which goes on from one has the same means as one that was not interrupted; States do not.
 
-    What two soft walls or contacts squeeze between them all the time has forces of both that are 10 to 100 % too large
-    at the recommended step, and right in short ones alone: the difference of both is right, and so are overlaps.
+    What two soft walls or contacts squeeze between them all the time has forces of both that are up to a quarter too
+    large at the recommended step, and right in short ones alone: the difference of both is right, and so are overlaps.
 
     Where nothing is summed up, forces are those at the present positions, with a duration of 0: of walls of
     ``wall_force``, in other Integrators, and as long as no step was taken.
