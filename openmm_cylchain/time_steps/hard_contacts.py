@@ -22,6 +22,7 @@ import scipy
 from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..errors import ContactWarning
 from ..filaments.collection import FilamentCollection
+from ..filaments.growth import segment_of_length
 from ..units.text import format_time
 from ..units.types import Numbers
 from .coupled_forces import CoupledForces
@@ -95,13 +96,23 @@ def warn_of_hard_contacts(
 
 
 def _chains_in_contact(filaments, contacts):
-    # Type, segments, and whether it is closed, of each kind of filament; beam elements touch at beads.
+    # Type, segments, and whether it is closed, of each kind of filament; beam elements touch at beads. Short filaments
+    # are softest: those that grow count as they are when they are shortest.
     owners = {int(nodes[0]): filament for filament, nodes in zip(filaments, filaments.node_indices)}
     for particle, attachment in zip(filaments.attachment_indices, filaments.attachments):
         owners[int(particle)] = filaments[attachment.filament]
     firsts = [contacts.getChainParticles(chain)[0] for chain in range(contacts.getNumChains())]
     found = [owners[first] for first in firsts if first in owners]
-    return set((filament.type, filament.segments, filament.closed) for filament in found)
+    return set((*_shortest(filament), filament.closed) for filament in found)
+
+
+def _shortest(filament):
+    growth, kind = filament.growth, filament.type
+    if growth is None:
+        return kind, filament.segments
+    monomers = growth.fewest_monomers(kind)
+    segments = max(1, round(monomers / growth.monomers_per_segment(kind)))
+    return segment_of_length(kind, monomers * growth.monomers.length / segments), segments
 
 
 def _mobility_of_spheres(filaments, system, contacts, particle_friction):

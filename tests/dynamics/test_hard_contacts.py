@@ -7,9 +7,11 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import (
+    ACTIN_ATP,
     F_ACTIN,
     ContactWarning,
     Filaments,
+    Growth,
     capsule_contact_force,
 )
 from openmm_cylchain.time_steps.hard_contacts import LARGEST_SOFTNESS, longest_resolving_step
@@ -66,6 +68,25 @@ def test_a_ring_has_no_end():
     step = longest_resolving_step(filaments, system, force, None)
     of_open_one = longest_resolving_step(open_ones, open_system, open_force, None)
     assert step == pytest.approx(4 ** (4 / 3) * of_open_one, rel=0.02)
+
+
+@pytest.mark.parametrize(("monomers", "segments"), [(20, 1), (130, 3)])
+def test_filaments_that_grow_count_as_they_are_when_they_are_shortest(monomers, segments):
+    """The softest filament decides for the contacts of all."""
+    kind, length = F_ACTIN.with_segment_length(108), monomers * ACTIN_ATP.length
+    growth = Growth(monomers=ACTIN_ATP, pool=unit.Quantity(1e-6, unit.molar), shortest=length, longest=5000)
+    steps = []
+    for one, count, options in (
+        (kind, 20, {"growth": growth}),
+        (kind.with_segment_length(length / segments), segments, {}),
+    ):
+        filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
+        filaments.add_straight(one, count, [0, 0, 0], [1, 0, 0], **options)
+        _, system, _ = filaments.build()
+        force = capsule_contact_force(filaments, system, 30.0, STIFFNESS)
+        system.addForce(force)
+        steps.append(longest_resolving_step(filaments, system, force, None))
+    assert steps[0] == pytest.approx(steps[1], rel=1e-6)
 
 
 @pytest.mark.parametrize(
