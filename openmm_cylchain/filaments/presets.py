@@ -4,9 +4,10 @@ from dataclasses import replace
 
 from openmm import unit
 
-from .end_states import EndStates
+from .end_states import DynamicInstability, EndStates
 from .filament_type import FilamentType
 from .monomers import Monomers, MonomerState
+from .severing import Severing
 
 _PICONEWTON = unit.piconewton
 _PER_AMOUNT = unit.liter / unit.mole / unit.second
@@ -132,4 +133,38 @@ TUBULIN = Monomers(
 Plus end 8.9 /uM/s and 44 /s, minus end 4.3 /uM/s and 23 /s. A dimer of 8 nm is one of 13 protofilaments. While they
 shrink, they lose 733 dimers per second at the plus end and 915 at the minus end: the ``shrinking_off_rate`` of a
 DynamicInstability. How often ends turn depends on the concentration, and much more on what is in a cell.
+"""
+
+_SPEED_IN_MITOSIS, _SHRINKING_IN_MITOSIS = 12.8e3 / 60.0, 14.1e3 / 60.0
+"""In nm/s."""
+
+TUBULIN_IN_MITOSIS = replace(
+    TUBULIN,
+    plus_on_rate=unit.Quantity((_SPEED_IN_MITOSIS / TUBULIN.length + 44.0) / 10.0 * 1e6, _PER_AMOUNT),
+)
+"""Tubulin of microtubules in mitotic cells: plus ends grow by 12.8 um/min at 10 uM of free dimers.
+
+The speed is that of astral microtubules in mitotic cells LLCPK-1 (Rusan, Fagerstrom, Yvon and Wadsworth, Mol. Biol.
+Cell 2001, 12, 971). The concentration is an assumption, and that the off rate is the one of TUBULIN. So is the minus
+end, which in cells is mostly capped (``Growth(minus_capped=True)``). INSTABILITY_IN_MITOSIS turns plus ends.
+"""
+
+INSTABILITY_IN_MITOSIS = DynamicInstability(
+    catastrophe_rate=0.058 / unit.second,
+    rescue_rate=0.045 / unit.second,
+    shrinking_off_rate=_SHRINKING_IN_MITOSIS / TUBULIN.length / unit.second,
+)
+"""Plus ends of astral microtubules in mitotic cells: they shrink by 14.1 um/min, and turn 0.058 and 0.045 times a
+second.
+
+Rusan et al., as for TUBULIN_IN_MITOSIS, with whose speed free microtubules are 12.4 um long on average. Between
+divisions, ends pause for most of the time.
+"""
+
+COFILIN = Severing(rate=0.032e-3 / ACTIN_ATP.length / (unit.nanometer * unit.second), of_states=("ADP",))
+"""Cofilin of fission yeast at the concentration at which it cuts most, for filaments of ACTIN_AGING.
+
+ADP-actin is cut 0.032 times per second in 1000 monomers, 0.012/s in each um (Chen and Pollard, J. Cell Biol. 2011, 195,
+485); that it cuts no other actin is an assumption. What it does to ends is left out. In files: ``severing_rate =
+"0.0119 1/(um*s)"`` with ``severing_states = ["ADP"]``.
 """

@@ -22,13 +22,13 @@ from openmm import unit
 from openmm_cylchain import (
     ACTIN_ATP,
     ALPHA_ACTININ,
+    COFILIN,
     F_ACTIN,
     MYOSIN_II,
     Filaments,
     Growth,
     MonomerPool,
     Nucleation,
-    Severing,
 )
 from openmm_cylchain.engine_choice import choose_engine
 
@@ -43,8 +43,6 @@ MONOMERS = replace(ACTIN_ATP, minus_off_rate=6.75 / unit.second)
 ACTIN = F_ACTIN.with_segment_length(MONOMERS_OF_SEGMENT * ACTIN_ATP.length)
 CONCENTRATION = unit.Quantity(10e-6, unit.molar)
 LONGEST = 10 * unit.micrometer
-SEVERING_RATE = 0.032e-3 / ACTIN_ATP.length * 1e-12
-"""In 1/(nm ps)."""
 
 _CASES = ("turnover", "growth_alone", "growth_with_births", "mechanics")
 _MEAN, _MOST = 20, 60
@@ -143,7 +141,7 @@ def create_network(system, step, growing=True, linked=True, births=None):
             pool=MonomerPool(CONCENTRATION),
             longest=LONGEST,
             vanishes=True,
-            severing=Severing(rate=SEVERING_RATE),
+            severing=replace(COFILIN, of_states=()),
         )
     sizes = np.clip(1 + generator.geometric(1.0 / (_MEAN - 1), system.filaments), 2, _MOST)
     for seed, size in enumerate(sizes, 1):

@@ -8,15 +8,20 @@ from openmm import unit
 from scipy.integrate import quad
 
 from openmm_cylchain import (
+    ACTIN_AGING,
     ALPHA_ACTININ,
+    COFILIN,
     DYNEIN,
     F_ACTIN,
     FILAMIN,
+    INSTABILITY_IN_MITOSIS,
     KINESIN_1,
     KINESIN_13,
     MICROTUBULE,
     MYOSIN_II,
+    TUBULIN_IN_MITOSIS,
     Filaments,
+    Growth,
     InputError,
 )
 from openmm_cylchain.kinetics.presets import PRESETS
@@ -105,3 +110,20 @@ def test_presets_refuse_filaments_that_they_do_not_bind_to():
         filaments.build()
     changed = dataclasses.replace(KINESIN_1, hands=dataclasses.replace(KINESIN_1.hands[0], binds_to=None))
     assert changed.hands[0].speed == KINESIN_1.hands[0].speed
+
+
+def test_speeds_of_microtubules_in_mitosis():
+    """12.8 and 14.1 um/min, at 10 uM."""
+    concentration = 10e-6 * 0.602214076  # 1/nm^3
+    net = TUBULIN_IN_MITOSIS.plus_on_rate * concentration - TUBULIN_IN_MITOSIS.plus_off_rate
+    per_minute = TUBULIN_IN_MITOSIS.length * 60e-3 / PER_SECOND
+    assert net * per_minute == pytest.approx(12.8)
+    assert INSTABILITY_IN_MITOSIS.shrinking_off_rate * per_minute == pytest.approx(14.1)
+
+
+def test_cofilin_cuts_actin_that_ages():
+    """0.032 times per second in 1000 monomers of ADP-actin."""
+    assert COFILIN.rate * 1000 * ACTIN_AGING.length / PER_SECOND == pytest.approx(0.032)
+    pool = unit.Quantity(1e-6, unit.molar)
+    growth = Growth(monomers=ACTIN_AGING, pool=pool, longest=2000.0, vanishes=True, severing=COFILIN)
+    assert growth.severing.of_states == (ACTIN_AGING.aging[-1].name,)

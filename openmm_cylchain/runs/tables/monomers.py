@@ -4,14 +4,19 @@ import dataclasses
 from dataclasses import dataclass
 
 from ...filaments.monomers import MonomerPool, Monomers, MonomerState
-from ...filaments.presets import ACTIN_AGING, ACTIN_ATP, TUBULIN
+from ...filaments.presets import ACTIN_AGING, ACTIN_ATP, TUBULIN, TUBULIN_IN_MITOSIS
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Inline, Key, Listing, Quantity, Text, WordOrQuantity
 from ..table import TableKind
 from .solvent import EDGES
 from .walls import volume_of_walls
 
-PRESETS = {"ACTIN_ATP": ACTIN_ATP, "ACTIN_AGING": ACTIN_AGING, "TUBULIN": TUBULIN}
+PRESETS = {
+    "ACTIN_ATP": ACTIN_ATP,
+    "ACTIN_AGING": ACTIN_AGING,
+    "TUBULIN": TUBULIN,
+    "TUBULIN_IN_MITOSIS": TUBULIN_IN_MITOSIS,
+}
 """Monomers by the names that a configuration uses."""
 
 _RATES = ("plus_on_rate", "plus_off_rate", "minus_on_rate", "minus_off_rate")
