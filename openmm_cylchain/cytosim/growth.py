@@ -77,12 +77,7 @@ def read_growth(translation, fiber, options):
             text = f"{fiber.name}: both ends are static, so it keeps its length"
             translation.document.note(EXACT, text, options.line)
         return _of_still(translation, fiber, cutting)
-    monomer = settings.number("unit_length", default=_USUAL_MONOMER if activity == "dynamic" else None)
-    if monomer is None:
-        monomer = _usual_monomer(settings)
-    if not 0.0 < monomer < math.inf:
-        raise settings.mistake("unit_length" if "unit_length" in settings else "segmentation", "must be positive.")
-    growing = Growing(fiber.name, settings, monomer)
+    growing = Growing(fiber.name, settings, monomer_of(settings))
     _LAWS[activity](translation, growing, states)
     if not growing.rates and len(growing.entries) > 1 and activity not in ("classic", "dynamic"):
         if cutting is None:
@@ -93,6 +88,17 @@ def read_growth(translation, fiber, options):
         _add_cutting(translation, growing, cutting)
     _add_ends(translation, growing, activity, rebirth)
     return growing
+
+
+def monomer_of(settings):
+    """The length in um of the monomers of fibers that grow, of which these are the Settings."""
+    is_dynamic = settings.text("activity", default="none") == "dynamic"
+    monomer = settings.number("unit_length", default=_USUAL_MONOMER if is_dynamic else None)
+    if monomer is None:
+        monomer = _usual_monomer(settings)
+    if not 0.0 < monomer < math.inf:
+        raise settings.mistake("unit_length" if "unit_length" in settings else "segmentation", "must be positive.")
+    return monomer
 
 
 def _usual_monomer(settings):

@@ -3,7 +3,7 @@
 import math
 
 from .document import EXACT, LEFT_OUT, NEAREST, Note, number_in, quantity
-from .growth import binding_key
+from .growth import binding_key, monomer_of
 from .settings import OFF
 
 _PLAIN, _MOTORS, _ON_SITES = ("bind", "none", ""), ("move", "motor"), ("walk", "digit")
@@ -70,6 +70,9 @@ def _read_activity(translation, hand, settings):
     if activity == "slide":
         _read_sliding(translation, hand, settings)
         return
+    if activity == "chew":
+        _read_chewing(translation, hand, settings)
+        return
     if activity not in (*_MOTORS, *_ON_SITES):
         # What else it has is of that activity.
         settings.take_rest()
@@ -110,6 +113,28 @@ def _read_sliding(translation, hand, settings):
         hand.note(NEAREST, "it stays at both ends", settings.line_of("hold_growing_end"))
 
 
+def _read_chewing(translation, hand, settings):
+    speed, line = settings.number("chewing_speed", "chewing_rate", default=0.0), settings.line_of("activity")
+    diffusion = settings.number("diffusion", "line_diffusion", default=0.0)
+    fibers = _growing_fibers(translation, settings)
+    if not fibers or not 0.0 < diffusion < math.inf or settings.number("hold_growing_end", default=0.0) < 1.0:
+        settings.values("hold_shrinking_end")
+        text = "activity = chew, of fibers that do not grow, or without diffusion or hold_growing_end = 1"
+        hand.note(LEFT_OUT, text, line, "hands: chew")
+        return
+    hand.set("sliding_friction", translation.thermal_energy / diffusion, "pN*s/um")
+    at_end = {"end": "both", "range": _AT_END, "tracks": True}
+    most = min(fiber.settings.number("max_chewing_speed", default=0.0) for fiber in fibers)
+    if speed > 0.0 and most > 0.0:
+        monomer = monomer_of(fibers[0].settings)
+        at_end["off_rate"] = quantity(min(speed, most) / monomer, "1/s")
+        at_end["sites"] = max(1, round(most / speed))
+        hand.note(NEAREST, f"chewing_speed = {speed:g}, of at most {at_end['sites']} hands at an end", line)
+    else:
+        hand.note(EXACT, "it takes nothing off: max_chewing_speed of fibers, or chewing_speed, is zero", line)
+    hand.table["filament_end"] = at_end
+
+
 def _read_cutting(hand, settings):
     rate = settings.number("cutting_rate", default=0.0)
     settings.values("new_end_state")
@@ -144,7 +169,7 @@ def _bind_near(translation, hand, settings, end, tracked):
         hand.table["binding_range"] = near
         hand.note(EXACT if reach >= _LEAST_REACH else NEAREST, "bind_only_end", line)
         return
-    if alone or end not in _ENDS or tracked != end or not _grows(translation, settings):
+    if alone or end not in _ENDS or tracked != end or not _growing_fibers(translation, settings):
         key, value = ("track_end", tracked) if end in OFF else ("bind_only_end", end)
         hand.note(LEFT_OUT, f"{key} = {value}", settings.line_of(key), _NEAR_ENDS)
         return
@@ -157,11 +182,12 @@ def _bind_near(translation, hand, settings, end, tracked):
     hand.note(EXACT, "bind_only_end; it is at the end itself as soon as it binds, where that is within its reach", line)
 
 
-def _grows(translation, settings):
-    # Whether there is a fiber that it binds to whose ends come and go.
+def _growing_fibers(translation, settings):
+    # Those that it binds to whose ends come and go.
     own = binding_key(settings.number("binding_key", ("binding", 2)))
-    grow = {made.name for made in translation.made if made.grows} | set(translation.nucleated)
-    return any(own & binding_key(translation.script.properties[name].settings.number("binding_key")) for name in grow)
+    names = {made.name for made in translation.made if made.grows} | set(translation.nucleated)
+    fibers = [translation.script.properties[name] for name in sorted(names)]
+    return [fiber for fiber in fibers if own & binding_key(fiber.settings.number("binding_key"))]
 
 
 def _hold_at_times(translation, hand, settings, holds):
@@ -180,7 +206,7 @@ def _hold_at_times(translation, hand, settings, holds):
 
 def _hold_shrinking(translation, hand, settings, forward):
     chances = [settings.number(("hold_shrinking_end", own), default=0.0) for own in (0, 1)]
-    if not any(chances) or not _grows(translation, settings) or "filament_end" in hand.table:
+    if not any(chances) or not _growing_fibers(translation, settings) or "filament_end" in hand.table:
         return
     line, walked_to = settings.line_of("hold_shrinking_end"), 0 if forward else 1
     if not {"speed", "sliding_friction"} & set(hand.table) and set(chances) <= {0.0, 1.0}:

@@ -120,3 +120,31 @@ def test_hands_at_ends(tmp_path):
     seldom = "activity = walk; step_size = 0.02; speed = 0.8; hold_growing_end = 0.999"
     found, document = translated(tmp_path, single(seldom))
     assert found.linkers[0].kind.hands[0].at_end == "hold" and document.missing == []
+
+
+def chewing(tmp_path, of_fibers, of_hands=""):
+    fiber = f"{CLASSIC}catastrophe_rate = 0.1; {of_fibers} }}\nnew 2 tube {{ length = 2; end_state = grow, static }}\n"
+    hand = "set hand eater { binding = 10, 0.05; unbinding = 1; activity = chew; diffusion = 0.025; "
+    hand += f"chewing_speed = 0.04; hold_growing_end = 1; {of_hands} }}\n"
+    own = "set single cutter { hand = eater; stiffness = 100; activity = fixed }\nnew 5 cutter { position = ball 1 }\n"
+    return translated(tmp_path, fiber + hand + own)
+
+
+def test_hands_that_chew_take_monomers_off_both_ends(tmp_path):
+    """At chewing_speed over the length of a monomer each, as long as all at an end do not exceed max_chewing_speed."""
+    found, document = chewing(tmp_path, "max_chewing_speed = 0.12")
+    assert document.missing == []
+    hand = found.linkers[0].kind.hands[-1]
+    length = found.filaments[0].growth.monomers.length
+    at_end = hand.filament_end
+    assert (at_end.end, at_end.tracks, at_end.sites) == ("both", True, 3)
+    assert at_end.off_rate * length == pytest.approx(0.04 * MICROMETER / SECOND)
+    # k_B T over the diffusion coefficient, in pN s/um.
+    assert hand.sliding_friction == pytest.approx(0.0042 / 0.025 * 0.602214076 * SECOND / MICROMETER)
+
+
+def test_hands_that_chew_no_fiber_are_said(tmp_path):
+    found, document = chewing(tmp_path, "")
+    assert document.missing == [] and found.linkers[0].kind.hands[-1].filament_end.off_rate == 0.0
+    _, document = chewing(tmp_path, "max_chewing_speed = 0.12", "hold_growing_end = 0")
+    assert "hands: chew" in document.missing
