@@ -116,6 +116,39 @@ def test_seeds_keep_their_equilibrium_at_the_recommended_step(segments, rate):
     assert integrator.getNumDividedSteps() < 400 * 120 * 1e-3
 
 
+def squares_across(options, milliseconds, count, steps):
+    """Mean square displacements of last nodes across their filaments in a step, and how often joints came and went."""
+    filaments = Filaments(1e-3 * unit.pascal * unit.second, TEMPERATURE)
+    for number in range(count):
+        filaments.add_equilibrium(ACTIN, 7, number, **options)
+    topology, system, positions = filaments.build()
+    context, integrator = simulate(filaments, system, positions, milliseconds * unit.millisecond)
+    ends = np.array([[own[0], own[-1]] for own in filaments.node_indices])
+    tips, directions, nodes = [], [], []
+    for _ in range(steps):
+        integrator.step(1)
+        own = context.getState(positions=True).getPositions(asNumpy=True)._value[ends]
+        along = own[:, 1] - own[:, 0]
+        tips.append(own[:, 1])
+        directions.append(along / np.linalg.norm(along, axis=1)[:, None])
+        nodes.append(filaments.in_context(context).growth().nodes if options else np.full(count, 8))
+    moves, directions = np.diff(tips, axis=0), np.array(directions[:-1])
+    across = (moves**2).sum(axis=2) - (moves * directions).sum(axis=2) ** 2
+    return across.mean(axis=0), np.count_nonzero(np.diff(nodes, axis=0))
+
+
+@pytest.mark.parametrize("milliseconds", [pytest.param(0.3, marks=pytest.mark.slow), 1.0])
+def test_tips_move_as_those_of_filaments_that_do_not_grow(milliseconds):
+    """That joints come and go near them moves them no more."""
+    own = growth((3000.0, 3000.0), longest=2.5 * unit.micrometer, minus_capped=True)
+    growing, passages = squares_across({"growth": own}, milliseconds, 200, 200)
+    still, _ = squares_across({}, milliseconds, 200, 200)
+    assert passages > 500
+    error = np.hypot(*(one.std(ddof=1) / np.sqrt(len(one)) / one.mean() for one in (growing, still)))
+    assert 4.0 * error < 0.05
+    assert growing.mean() / still.mean() == pytest.approx(1.0, abs=0.01 + 4.0 * error)
+
+
 def test_spare_nodes_are_where_the_last_node_is():
     filaments = Filaments(1e-3 * unit.pascal * unit.second, TEMPERATURE)
     for number in range(5):
