@@ -51,7 +51,6 @@ folder.mkdir(parents=True, exist_ok=True)
 thermal_energy = (unit.MOLAR_GAS_CONSTANT_R * TEMPERATURE).value_in_unit(unit.kilojoule_per_mole)
 dna = DSDNA.with_segment_length(SEGMENT_LENGTHS)
 filaments = Filaments(VISCOSITY, TEMPERATURE)
-springs = Crosslinks(STIFFNESSES[-1] * thermal_energy, 0.0)
 for column, count in enumerate(SEGMENTS):
     for row in range(len(STIFFNESSES) * REPLICAS):
         filaments.add_equilibrium(dna, count, seed=1000 * column + row, start=[200.0 * column, 200.0 * row, 0])
@@ -111,8 +110,9 @@ colors = plt.cm.viridis(np.linspace(0.0, 0.9, len(STIFFNESSES)))
 for row, color in enumerate(colors):
     for column in range(len(SEGMENTS)):
         nodes = now[filaments.node_indices[(column * len(STIFFNESSES) + row) * REPLICAS]]
+        nodes = nodes - nodes.mean(axis=0)
         # Seen along the direction in which it is flattest.
-        flat = (nodes - nodes.mean(axis=0)) @ np.linalg.svd(nodes - nodes.mean(axis=0))[2][:2].T
+        flat = nodes @ np.linalg.svd(nodes)[2][:2].T
         loops.plot(*(flat + [column * 110, -row * 90]).T, color=color, linewidth=3, solid_capstyle="round")
 loops.set_aspect("equal")
 loops.axis("off")

@@ -121,10 +121,13 @@ monomers come and go leaves the concentration as it is at which the end stands s
 profilin speeds them up.
 """
 
+_TUBULIN_OFF_RATE = 44.0
+"""Of the plus end, per second."""
+
 TUBULIN = Monomers(
     length=8.0 / 13.0 * unit.nanometer,
     plus_on_rate=unit.Quantity(8.9e6, _PER_AMOUNT),
-    plus_off_rate=44.0 / unit.second,
+    plus_off_rate=_TUBULIN_OFF_RATE / unit.second,
     minus_on_rate=unit.Quantity(4.3e6, _PER_AMOUNT),
     minus_off_rate=23.0 / unit.second,
 )
@@ -140,7 +143,7 @@ _SPEED_IN_MITOSIS, _SHRINKING_IN_MITOSIS = 12.8e3 / 60.0, 14.1e3 / 60.0
 
 TUBULIN_IN_MITOSIS = replace(
     TUBULIN,
-    plus_on_rate=unit.Quantity((_SPEED_IN_MITOSIS / TUBULIN.length + 44.0) / 10.0 * 1e6, _PER_AMOUNT),
+    plus_on_rate=unit.Quantity((_SPEED_IN_MITOSIS / TUBULIN.length + _TUBULIN_OFF_RATE) / 10.0 * 1e6, _PER_AMOUNT),
 )
 """Tubulin of microtubules in mitotic cells: plus ends grow by 12.8 um/min at 10 uM of free dimers.
 

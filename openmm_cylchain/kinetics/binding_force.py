@@ -23,6 +23,8 @@ from .linker_table import LinkerTable
 from .linkers import LinkerPulls, Linkers
 
 BINDING_FORCE_NAME = "Linkers"
+_ANY_NUMBER = 2**31 - 1
+"""Of hands that take monomers off an end."""
 
 
 def is_binding_force(force: openmm.Force) -> bool:
@@ -147,10 +149,6 @@ def place_linkers(
     rows: list[list[Any]] = [np.concatenate(column).ravel().tolist() for column in columns]
     count = len(rows[0])
     force.setLinkers(list(range(count)), *rows, count)
-
-
-# Of hands that take monomers off an end.
-_ANY_NUMBER = 2**31 - 1
 
 
 def _add_hand(force, hand, filaments, name):

@@ -103,10 +103,10 @@ def _chains_in_contact(filaments, contacts):
         owners[int(particle)] = filaments[attachment.filament]
     firsts = [contacts.getChainParticles(chain)[0] for chain in range(contacts.getNumChains())]
     found = [owners[first] for first in firsts if first in owners]
-    return set((*_shortest(filament), filament.closed) for filament in found)
+    return set((*_at_its_shortest(filament), filament.closed) for filament in found)
 
 
-def _shortest(filament):
+def _at_its_shortest(filament):
     growth, kind = filament.growth, filament.type
     if growth is None:
         return kind, filament.segments

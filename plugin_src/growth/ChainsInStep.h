@@ -50,7 +50,7 @@ public:
     void set(int index, const std::vector<Vec3d>& nodes);
     /** Let what is beyond a length along a chain belong to another one, as others see it. */
     void move(int index, int other, double beyond);
-    /** Call a function of each hand that cuts a growing chain, end -1, or takes monomers off an end. */
+    /** Call a function of each hand that takes monomers off an end of a growing chain, or cuts it where that is -1. */
     template <class Function> void forHands(int index, int end, Function function) const {
         const auto found = hands.find(system.chains[index].chain);
         if (found != hands.end())

@@ -123,7 +123,7 @@ void LinkerKinetics::slideHand(Linker& linker, int side, const KineticStep& step
         const int end = place.position > contours.getEnd(place.chain, 1) ? 1 : 0;
         if (hand.atEnd.tracks && hand.atEnd.isAt(end))
             linker.hands[side].position = contours.getEnd(place.chain, end);
-        else if (!staysBeyond(hand, place))
+        else if (!hand.holdsAtEnds)
             unbind(linker, side, nullptr, count);
         return;
     }

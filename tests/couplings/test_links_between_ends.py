@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from openmm import Context, Platform, unit
 
-from openmm_cylchain import DSDNA, Crosslinks, Filaments, theory
+from openmm_cylchain import DSDNA, Crosslinks, Filaments
+from support.gap_draws import turned_by
 from support.linked_networks import mean_and_error
 
 TEMPERATURE = 310 * unit.kelvin
@@ -36,11 +37,7 @@ def draw_distances(generator, count):
     tangents = np.tile([0.0, 0.0, 1.0], (count, 1))
     ends = lengths[0][:, None] * tangents
     for cosine, length in zip(cosines, lengths[1:]):
-        across = generator.normal(size=(count, 3))
-        across -= np.einsum("ij,ij->i", across, tangents)[:, None] * tangents
-        across *= (np.sqrt(1 - cosine**2) / np.linalg.norm(across, axis=1))[:, None]
-        tangents = cosine[:, None] * tangents + across
-        tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+        tangents = turned_by(tangents, cosine, generator)
         ends += length[:, None] * tangents
     return np.linalg.norm(ends, axis=1), (1 - cosines).sum(axis=0)
 
@@ -91,11 +88,3 @@ def test_a_loop_costs_what_it_should_at_the_recommended_step():
         both = np.hypot(own, error)
         assert both < 0.008 * mean
         assert abs(value - mean) < 0.005 * mean + 4 * both, f"{name}: {value / mean:.4f} +- {both / mean:.4f} of exact"
-
-
-def test_the_j_factor_of_a_wormlike_chain_is_that_of_its_fine_chain():
-    # Four million draws of chains in segments of a twentieth of the persistence length, with 0.03 k_BT/nm^2.
-    drawn = {100.0: 4.40e-8, 150.0: 6.90e-8, 200.0: 6.90e-8}
-    lengths = np.array(list(drawn))
-    assert theory.wlc_j_factor(lengths, 50 * unit.nanometer) == pytest.approx(np.array(list(drawn.values())), rel=0.1)
-    assert theory.wlc_j_factor(0.1 * unit.micrometer, 50.0) == pytest.approx(4.064e-8, rel=1e-3)

@@ -36,7 +36,11 @@ def filament_distance(first, second):
 def _turned(tangents, stiffness, generator):
     # By angles with the weight exp(stiffness cos).
     share = generator.uniform(np.exp(-2 * stiffness), 1, len(tangents))
-    cosines = 1 + np.log(share) / stiffness
+    return turned_by(tangents, 1 + np.log(share) / stiffness, generator)
+
+
+def turned_by(tangents, cosines, generator):
+    """Unit vectors (count, 3) that are turned by angles with so many cosines (count,), about random axes."""
     across = generator.normal(size=tangents.shape)
     across -= np.einsum("ij,ij->i", across, tangents)[:, None] * tangents
     across /= np.linalg.norm(across, axis=1)[:, None]

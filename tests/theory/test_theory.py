@@ -506,3 +506,11 @@ def test_types_that_cannot_be_calibrated():
         replace(DSDNA, calibrated_force=1.0)
     with pytest.raises(InputError, match="force"):
         theory.calibrated_up_to_force(DSDNA, 0.0, TEMPERATURE)
+
+
+def test_the_j_factor_of_a_wormlike_chain_is_that_of_its_fine_chain():
+    # Four million draws of chains in segments of a twentieth of the persistence length, with 0.03 k_BT/nm^2.
+    drawn = {100.0: 4.40e-8, 150.0: 6.90e-8, 200.0: 6.90e-8}
+    lengths = np.array(list(drawn))
+    assert theory.wlc_j_factor(lengths, 50 * unit.nanometer) == pytest.approx(np.array(list(drawn.values())), rel=0.1)
+    assert theory.wlc_j_factor(0.1 * unit.micrometer, 50.0) == pytest.approx(4.064e-8, rel=1e-3)

@@ -104,7 +104,7 @@ public:
     virtual void findChangesOfEnds(std::vector<cylchain::HeldEnd>&) const {
     }
     /**
-     * Add its hands that cut chains.
+     * Add its hands that cut chains, or take monomers off their ends.
      */
     virtual void findActingHands(std::vector<cylchain::ActingHand>&) {
     }
