@@ -52,6 +52,7 @@ void CandidatePairs::begin(const CoupledStart& start, const CapsulePlaces& newPl
     begun = start.positions;
     kT = start.settings.kT;
     places = &newPlaces;
+    active = &start.active;
     responses = &newResponses;
     const vector<Capsule>& capsules = search->getSystem().capsules;
     double diameter = 0, response = 0;
@@ -120,7 +121,7 @@ bool CandidatePairs::follow(bool settled, const double* moved, const GapNoise& n
         search->setMotion(begun, moved, *loop);
     }
     else {
-        motion.follow([] (int) {return true;}, moved, slack, *loop, [&] (const vector<int>& capsules) {
+        motion.follow([&] (int capsule) {return takesPart(capsule);}, moved, slack, *loop, [&] (const vector<int>& capsules) {
             search->updateMotion(capsules, moved);
         });
         firstNew = pairs.size();

@@ -64,6 +64,10 @@ public:
     double placeHardSurface(int pair, double begun, Gap& gap) const;
     /** Get the candidates and other pairs that have passed through each other where the last iteration has led. */
     const std::vector<int>& getCrossed();
+    /** Get whether a capsule of a pair took part in the last iteration. */
+    bool hasMoved(int pair) const {
+        return takesPart(get(pair).a) || takesPart(get(pair).b);
+    }
     bool movesTooFar() const {
         return tooFar;
     }
@@ -76,6 +80,9 @@ private:
     bool mayClose(int pair, double before, double after, double& room) const;
     void drawSurfaces(int first, int last);
     void select(int firstNew);
+    bool takesPart(int capsule) const {
+        return !places->isHeld(capsule) && (*active)[places->get(capsule).pack];
+    }
     std::uint32_t keyOf(const ContactPair& pair) const {
         return (std::uint32_t) force*0x9E3779B1u+pair.a;
     }
@@ -86,6 +93,7 @@ private:
     const Loop* loop = nullptr;
     const double* begun = nullptr;
     const CapsulePlaces* places = nullptr;
+    const PackFlags* active = nullptr;
     const std::vector<double>* responses = nullptr;
     const GapNoise* noise = nullptr;
     double slack = 0, reach = 0;

@@ -271,11 +271,14 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
         near.back().pair = pair;
     }
     runInChunks(*loop, near.size(), CHUNK_OF_CONTACT_GAPS, [&] (int i) {
+        near[i].hasMoved = false;
+        if (near[i].way >= 0 && !candidates.hasMoved(near[i].pair))
+            return;
         follow(near[i]);
         if (near[i].number < 0)
             return;
         if (near[i].hasMoved)
-            gaps.get(near[i].number) = near[i].gap;
+            gaps.turn(near[i].number, near[i].gap);
         else
             gaps.get(near[i].number).end = near[i].gap.end;
     });
@@ -314,7 +317,7 @@ bool ContactGaps::followAgain(ReflectedGaps& gaps) {
     bool any = false;
     for (const NearPair& own : near)
         if (own.hasMoved) {
-            gaps.get(own.number) = own.gap;
+            gaps.turn(own.number, own.gap);
             any = true;
         }
     return any;

@@ -43,7 +43,7 @@ public:
     void begin(const CoupledStart& start, const Loop& loop) override;
     bool findGaps(int iteration, bool settled, const double* moved, ReflectedGaps& gaps) override;
     Rests getRests() const override {
-        return Rests::Wrong;
+        return Rests::Worthwhile;
     }
     bool followAgain(ReflectedGaps& gaps) override;
     void findFailures(const double* moved, std::vector<bool>& failed) override;

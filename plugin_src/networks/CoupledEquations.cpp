@@ -271,7 +271,14 @@ void CoupledEquations::push(const vector<PackStep*>& packs, size_t firstEquation
     }
     for (size_t i = 0; i < found.size(); i++)
         found[i] += ownForces[i];
-    findMoves(firstEquation, pushed, pushedMoves, loop);
+}
+
+array<double, 3> CoupledEquations::getPushedMove(size_t equation, int side) const {
+    array<double, 3> result = {};
+    const int term = termOf[2*equation+side];
+    for (int k = 0; k < 3 && term >= 0; k++)
+        result[k] = pushed[TermBlocks::place(term, k)];
+    return result;
 }
 
 void CoupledEquations::advance(const vector<PackStep*>& packs, const PackFlags& active, const ShareOfChange& share,

@@ -5,6 +5,7 @@
 #include "mechanics/Loop.h"
 #include "networks/ChainPlaces.h"
 #include "networks/ConjugateGradients.h"
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -67,10 +68,8 @@ public:
      */
     void push(const std::vector<PackStep*>& packs, std::size_t first, const std::vector<double>& loads,
             const Demands& demands, const Loop& loop);
-    /** For each of these equations, how much more its first place moves against the second with them. */
-    const std::vector<double>& getPushedMoves() const {
-        return pushedMoves;
-    }
+    /** How much more a place of one of these equations moves with them. */
+    std::array<double, 3> getPushedMove(std::size_t equation, int side) const;
     /** The terms of a pack: the first of them, and how many there are. */
     int firstTerm(int pack) const {
         return gathered.first[pack];
@@ -139,7 +138,7 @@ private:
     double least = 0, tighter = 1;
     ConjugateGradients<float> single;
     ConjugateGradients<double> twice;
-    std::vector<double> moves, pushedMoves, compliancesOfTerms, jointStiffness;
+    std::vector<double> moves, compliancesOfTerms, jointStiffness;
     /** For packs that may move together, three numbers for each term: see PackStep::setExpectedForces(). */
     std::vector<double> expected;
     std::vector<int> firstOfPack, firstOfNode;

@@ -111,7 +111,7 @@ void GapResponses::addPorts(const vector<Gap>& gaps) {
 
 bool GapResponses::isComplete() const {
     return all_of(used.begin(), used.end(), [&] (int chain) {
-        return chains[chain].known == chains[chain].count();
+        return isComplete(chain);
     });
 }
 
@@ -125,11 +125,13 @@ void GapResponses::find(const vector<Gap>& gaps, const vector<size_t>& firstEqua
         CoupledEquations& coupled, Precision precision, bool single, const Loop& loop) {
     links.find(packs, coupled, precision, loop);
     vector<vector<int> > chainsOfPack(packs.size());
-    for (int chain : used)
-        if (chains[chain].known < chains[chain].count()) {
+    for (int chain : used) {
+        chains[chain].isNew = !isComplete(chain);
+        if (chains[chain].isNew) {
             const Port& port = chains[chain].ports[0];
             chainsOfPack[gaps[port.gap].packOf(port.side)].push_back(chain);
         }
+    }
     loop(packs.size(), [&] (int pack) {
         while (!chainsOfPack[pack].empty())
             if (single)

@@ -38,12 +38,17 @@ public:
         const double* rootOf(int port) const {
             return &roots[(std::size_t) port*stride];
         }
+        /** Whether the last call of find() has found responses, or takeForNew() was called since. */
+        bool areNew() const {
+            return isNew;
+        }
     private:
         friend class GapResponses;
         void grow(int newLinks);
         bool findRoot();
         /** How many ports have responses, how long rows are, and the number of links. */
         int known = 0, stride = 0, links = 0;
+        bool isNew = false;
         std::vector<double> responses, roots;
         /** How forces on all ports move the links of the chain: three rows for each link. */
         std::vector<double> movesOfLinks;
@@ -54,8 +59,28 @@ public:
     void setLinks(const std::vector<CouplingEquation>& equations);
     /** Add the ports of gaps that have none yet. */
     void addPorts(const std::vector<Gap>& gaps);
-    /** Whether all responses are known. */
+    /** Whether all responses are known, or those of a chain. */
     bool isComplete() const;
+    bool isComplete(int chain) const {
+        return chains[chain].known == chains[chain].count();
+    }
+    /** The same of one of a gap's chains. */
+    bool areNew(int gap) const {
+        bool result = false;
+        forPorts(gap, [&] (const ChainPorts& chain, int) {
+            result |= chain.areNew();
+        });
+        return result;
+    }
+    /** Take all responses for new ones. */
+    void takeForNew() {
+        for (int chain : used)
+            chains[chain].isNew = true;
+    }
+    /** Whether links join chains. */
+    bool haveLinks() const {
+        return !links.getLinks().empty();
+    }
     /**
      * Find the responses that are not known: by a substitution for a port of each lane of a pack at a time.
      *

@@ -263,6 +263,7 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
     for (ImplicitCouplings* own : couplings)
         own->beginStage(stage, steps[0]->getNumStages(), moved.data());
     active.assign(numPacks, 1);
+    goingOn.assign(places.getNumChains(), 1);
     vector<size_t>& first = firstEquations;
     first.resize(couplings.size()+1);
     const bool turns = any_of(couplings.begin(), couplings.end(), [] (const ImplicitCouplings* own) {
@@ -300,7 +301,7 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
                         couplings[i]->setCompliances(compliances.data()+12*first[i]);
             }
         }
-        gaps.push(stepsOfPacks, coupled, demands, attempt.loop);
+        gaps.push(stepsOfPacks, active, goingOn, coupled, demands, attempt.loop);
         ShareOfChange share;
         share.part = iteration < UNDAMPED_ITERATIONS ? 1 : DAMPING;
         if (gaps.size() > 0)
@@ -320,13 +321,14 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
             return more;
         };
         const bool more = findGaps(false), unfinished = gaps.anyUnfinished();
-        if (any || unfinished || (more && (findGaps(true) || gaps.anyUnfinished())))
-            continue;
-        bool others = false;
-        for (ImplicitCouplings* own : couplings)
-            others |= own->followAgain(gaps);
-        if (!others || !gaps.anyUnfinished())
-            return true;
+        if (!any && !unfinished && !(more && (findGaps(true) || gaps.anyUnfinished()))) {
+            bool others = false;
+            for (ImplicitCouplings* own : couplings)
+                others |= own->followAgain(gaps);
+            if (!others || !gaps.anyUnfinished())
+                return true;
+        }
+        chooseActive();
     }
     return false;
 }
@@ -337,29 +339,38 @@ void NetworkStep::placeSites(double* positions) const {
         own->placeSites(positions);
 }
 
-/** Find the packs that need another iteration; false if there are none. */
+/** Find the chains that need another iteration, but for gaps; false if there are none. */
 bool NetworkStep::finishIteration(const vector<size_t>& first) {
-    PackFlags next(active.size(), 0);
+    PackFlags ofCouplings(active.size(), 0);
     bool unknown = false;
     for (size_t i = 0; i < couplings.size(); i++)
         if (couplings[i]->finishIteration(coupled.getMoves().data()+3*first[i], moved.data()))
-            unknown |= !couplings[i]->markUnfinished(next);
-    for (size_t pack = 0; pack < active.size(); pack++) {
-        const size_t lanes = chainsOfLanes[pack].size();
-        next[pack] |= any_of(unfinished[pack].get(), unfinished[pack].get()+lanes, [] (bool flag) {return flag;});
-    }
-    const bool any = unknown || find(next.begin(), next.end(), 1) != next.end();
-    // Where no couplings take many iterations for a few packs, all packs end together, and rests would not pay.
+            unknown |= !couplings[i]->markUnfinished(ofCouplings);
+    bool any = unknown || find(ofCouplings.begin(), ofCouplings.end(), 1) != ofCouplings.end();
     auto anyHas = [&] (Rests rests) {
         return any_of(couplings.begin(), couplings.end(), [&] (const ImplicitCouplings* own) {
             return own->getRests() == rests;
         });
     };
-    const bool rests = anyHas(Rests::Worthwhile) && !anyHas(Rests::Wrong);
-    if (unknown || !rests)
-        next.assign(next.size(), 1);
-    active.swap(next);
+    // Where no couplings take many iterations for a few packs, all packs end together, and rests would not pay.
+    const bool rest = !unknown && anyHas(Rests::Worthwhile) && !anyHas(Rests::Wrong) && gaps.allowRests();
+    goingOn.assign(goingOn.size(), !rest);
+    for (size_t pack = 0; pack < active.size(); pack++)
+        for (size_t lane = 0; lane < chainsOfLanes[pack].size(); lane++)
+            if (const int chain = chainsOfLanes[pack][lane]; chain >= 0) {
+                goingOn[chain] |= ofCouplings[pack] | unfinished[pack][lane];
+                any |= unfinished[pack][lane];
+            }
     return any;
+}
+
+/** Let the packs of chains that go on take part in the next iteration. */
+void NetworkStep::chooseActive() {
+    gaps.markUnfinished(goingOn);
+    for (size_t pack = 0; pack < active.size(); pack++)
+        active[pack] = any_of(chainsOfLanes[pack].begin(), chainsOfLanes[pack].end(), [&] (int chain) {
+            return chain >= 0 && goingOn[chain];
+        });
 }
 
 /** Take note of the forces on chains that have taken a step, or a part of it. */

@@ -57,6 +57,7 @@ private:
     void chooseCouplings(const CoupledStart& start);
     bool iterate(const Attempt& attempt, int stage);
     bool finishIteration(const std::vector<std::size_t>& first);
+    void chooseActive();
     void placeSites(double* positions) const;
     void addImpulses(const std::vector<bool>& taken, double stepSize);
     bool divide(const Attempt& whole, int division, double* displacements, std::vector<bool>& failed);
@@ -97,6 +98,8 @@ private:
     LaneFlags unfinished, flags;
     /** The packs that take part in an iteration: the others have converged, and nothing holds them otherwise. */
     PackFlags active;
+    /** The chains in them that need it. */
+    std::vector<char> goingOn;
     /** The coupling by which a step that cannot be divided any more has gone wrong. */
     BrokenCoupling culprit;
     int iterations = 0, substitutions = 0;

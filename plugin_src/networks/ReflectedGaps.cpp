@@ -72,6 +72,15 @@ void ReflectedGaps::begin(const StepSettings& settings, const ChainPlaces& place
     changes.clear();
     predicted.clear();
     corrections.clear();
+    applied.clear();
+    lacking.clear();
+    turned.clear();
+}
+
+void ReflectedGaps::turn(int number, const Gap& gap) {
+    gaps[number] = gap;
+    if (number < (int) turned.size())
+        turned[number] = 1;
 }
 
 int ReflectedGaps::add(const Gap& gap) {
@@ -128,10 +137,12 @@ void ReflectedGaps::drawNumbers(const Loop& loop) {
     });
 }
 
-/** Give numbers of ports the covariance of the responses, and sum them for each gap. */
+/** Give numbers of ports the covariance of the responses, and sum them for each gap that has new ones. */
 void ReflectedGaps::correlate(const vector<double>& normals, vector<double>& sums, const Loop& loop) const {
     sums.resize(gaps.size()*parts);
     runInChunks(loop, gaps.size(), CHUNK_OF_GAPS, [&] (int gap) {
+        if (!responses.areNew(gap))
+            return;
         double* const sum = &sums[(size_t) gap*parts];
         fill_n(sum, parts, 0.0);
         responses.forPorts(gap, [&] (const GapResponses::ChainPorts& chain, int row) {
@@ -155,6 +166,8 @@ void ReflectedGaps::findNoise(const Loop& loop) {
     correlate(ofReflections, reflections, loop);
     const double size = sqrt(2*kT/parts);
     runInChunks(loop, gaps.size(), CHUNK_OF_GAPS, [&] (int i) {
+        if (!responses.areNew(i))
+            return;
         double *const bridge = &bridges[(size_t) i*parts], *const reflection = &reflections[(size_t) i*parts];
         const double mean = accumulate(bridge, bridge+parts, 0.0)/parts;
         const double ofChains = responses.getOfChains(i);
@@ -190,26 +203,69 @@ double ReflectedGaps::findPushOfSpring(int i, int part, double end) const {
 /** The force of a gap in a part of the step, with what others push. */
 double ReflectedGaps::findPush(int i, int part) const {
     const GapInPart& gap = inPart[i];
-    const MotionOfPort &one = motions[gap.ports[0]], &other = motions[gap.ports[1]];
-    const double end = gap.end+one.all+other.all-gap.ofChains*gap.push;
+    const int one = gap.ports[0], other = gap.ports[1];
+    const double end = gap.end+motions[one]+motions[other]-gap.ofChains*gap.push;
     if (!gap.isReflected)
         return findPushOfSpring(i, part, end);
-    return reflect(gap.start+one.atStart+other.atStart, end, gap.response, gap.ofChains, gap.variate);
+    return reflect(gap.start+motionsAtStart[one]+motionsAtStart[other], end, gap.response, gap.ofChains, gap.variate);
 }
 
 /** Let a force on a gap move all ports of its chains. */
 void ReflectedGaps::move(int i, double push, bool reflects) {
-    responses.forPorts(i, [&] (const GapResponses::ChainPorts& chain, int port) {
-        const double* const row = chain.responsesOf(port);
-        MotionOfPort* const to = &motions[chain.first];
-        for (int k = 0; k < chain.count(); k++) {
-            const double way = push*row[k];
-            to[k].all += way;
-            const int other = chain.ports[k].gap;
-            if (!reflects || other == i || row[k] == 0)
-                continue;
-            const double both = inPart[i].ofChains*inPart[other].ofChains;
-            to[k].atStart += row[k] > 0 ? SHARE_OF_OPENING*way : -SHARE_OF_CLOSING*min(1.0, row[k]*row[k]/both)*way;
+    for (int side = 0; side < 2; side++)
+        if (gaps[i].packOf(side) >= 0)
+            moveChain(i, side, push, reflects);
+}
+
+/** Let a force on a gap move all ports of the chain on one of its sides. */
+void ReflectedGaps::moveChain(int i, int side, double push, bool reflects) {
+    const GapResponses::ChainPorts& chain = responses.getPorts(gaps[i].chainOf(side));
+    const int count = chain.count(), own = responses.getPort(i, side)-chain.first;
+    const double* const row = chain.responsesOf(own);
+    double* const to = &motions[chain.first];
+    for (int k = 0; k < count; k++)
+        to[k] += push*row[k];
+    if (!reflects)
+        return;
+    const double* const shares = &sharesAtStart[gaps[i].chainOf(side)][(size_t) own*count];
+    double* const toStart = &motionsAtStart[chain.first];
+    for (int k = 0; k < count; k++)
+        toStart[k] += push*shares[k];
+}
+
+/** The gaps of all other ports on the chains of a gap that is pushed must be looked at again. */
+void ReflectedGaps::noteMotion(int i) {
+    for (int side = 0; side < 2; side++)
+        if (gaps[i].packOf(side) >= 0) {
+            const GapResponses::ChainPorts& chain = responses.getPorts(gaps[i].chainOf(side));
+            char* const own = &haveMoved[responses.getPort(i, side)];
+            const char before = *own;
+            fill_n(&haveMoved[chain.first], chain.count(), 1);
+            *own = before;
+        }
+}
+
+/** Find what of the motion of each port by forces on each other one counts at the start of a part. */
+void ReflectedGaps::findSharesAtStart(const Loop& loop) {
+    sharesAtStart.resize(responses.getNumChains());
+    const vector<int>& chains = responses.getChains();
+    runInChunks(loop, chains.size(), CHUNK_OF_GAPS, [&] (int number) {
+        const GapResponses::ChainPorts& chain = responses.getPorts(chains[number]);
+        if (!chain.areNew())
+            return;
+        vector<double>& shares = sharesAtStart[chains[number]];
+        shares.assign((size_t) chain.count()*chain.count(), 0.0);
+        for (int port = 0; port < chain.count(); port++) {
+            const double* const row = chain.responsesOf(port);
+            const int own = chain.ports[port].gap;
+            for (int k = 0; k < chain.count(); k++) {
+                const int other = chain.ports[k].gap;
+                if (other == own || row[k] == 0)
+                    continue;
+                const double both = responses.getOfChains(own)*responses.getOfChains(other);
+                shares[(size_t) port*chain.count()+k] = row[k] > 0 ? SHARE_OF_OPENING*row[k] :
+                        -SHARE_OF_CLOSING*min(1.0, row[k]*row[k]/both)*row[k];
+            }
         }
     });
 }
@@ -220,31 +276,45 @@ void ReflectedGaps::move(int i, double push, bool reflects) {
  */
 void ReflectedGaps::findPushesOfPart(int part, const Loop& loop) {
     const int count = gaps.size();
-    motions.assign(responses.countPorts()+1, MotionOfPort());
+    motions.assign(responses.countPorts()+1, 0.0);
+    motionsAtStart.assign(responses.countPorts()+1, 0.0);
+    haveMoved.assign(responses.countPorts(), 1);
+    haveMoved.push_back(0);
     all.visit(false, loop, [&] (int i) {
-        inPart[i].push = inPart[i].response > 0 ? pushes[(size_t) i*parts+part] : 0;
+        if (roles[i] == Role::Apart)
+            return 0.0;
+        inPart[i].push = roles[i] == Role::Beside || inPart[i].response > 0 ? pushes[(size_t) i*parts+part] : 0;
         if (inPart[i].push != 0)
             move(i, inPart[i].push, inPart[i].isReflected);
         return 0.0;
     });
-    // The change of a gap, over what it may be.
+    // The change of a gap, over what it may be: none where nothing has moved it since.
     auto update = [&] (int i) {
         GapInPart& gap = inPart[i];
+        bool hasMoved = false;
+        for (int port : gap.ports)
+            if (haveMoved[port] != 0) {
+                hasMoved = true;
+                haveMoved[port] = 0;
+            }
+        if (!hasMoved)
+            return 0.0;
         const double push = findPush(i, part), change = push-gap.push, way = fabs(change)*gap.ofChains/gap.tolerance;
         // Written so that NaN is no change.
         if (!(way > LEAST_SHARE))
             return 0.0;
         gap.push = push;
         move(i, change, gap.isReflected);
+        noteMotion(i);
         return way;
     };
     bool converged = false;
     for (int sweeps = 0; sweeps < MOST_SWEEPS; sweeps++) {
         double largest = all.visit(false, loop, [&] (int i) {
-            return inPart[i].response > 0 ? update(i) : 0.0;
+            return roles[i] == Role::Pushed && inPart[i].response > 0 ? update(i) : 0.0;
         });
         pushed.select(all, [&] (int i) {
-            return inPart[i].push != 0;
+            return roles[i] == Role::Pushed && inPart[i].push != 0;
         });
         if (largest == 0 || (converged && largest <= 1))
             break;
@@ -258,18 +328,19 @@ void ReflectedGaps::findPushesOfPart(int part, const Loop& loop) {
         }
     }
     for (int i = 0; i < count; i++)
-        pushes[(size_t) i*parts+part] = inPart[i].push;
+        if (roles[i] == Role::Pushed)
+            pushes[(size_t) i*parts+part] = inPart[i].push;
 }
 
-/** Find the forces of all gaps from their starts, and their ends without forces. */
+/** Find the forces of gaps from their starts, and their ends without forces. */
 void ReflectedGaps::findPushes(const Loop& loop) {
     const int count = gaps.size(), none = responses.countPorts();
     inPart.resize(count);
-    forces.assign(count, 0.0);
-    all.sort(count, responses);
     runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
         GapInPart& gap = inPart[i];
-        predicted[i] = gaps[i].start;
+        if (roles[i] == Role::Pushed)
+            forces[i] = 0;
+        gap.reached = gaps[i].start;
         gap.isReflected = gaps[i].law == GapLaw::Reflection;
         gap.ofChains = responses.getOfChains(i);
         gap.response = gaps[i].present ? responses.getOwn(i) : 0;
@@ -279,31 +350,79 @@ void ReflectedGaps::findPushes(const Loop& loop) {
     });
     for (int part = 0; part < parts; part++) {
         runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
+            if (roles[i] != Role::Pushed)
+                return;
             GapInPart& gap = inPart[i];
-            gap.start = predicted[i];
+            gap.start = gap.reached;
             gap.end = gap.start+(free[i]-gaps[i].start)/parts+bridges[(size_t) i*parts+part];
             gap.variate = kT/parts*reflections[(size_t) i*parts+part];
         });
         findPushesOfPart(part, loop);
         runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
-            const GapInPart& gap = inPart[i];
+            if (roles[i] != Role::Pushed)
+                return;
+            GapInPart& gap = inPart[i];
             forces[i] += gap.push;
-            predicted[i] = gap.end+motions[gap.ports[0]].all+motions[gap.ports[1]].all;
-            if (gap.isReflected && part < parts-1)
-                predicted[i] = max(predicted[i], 0.0);
+            gap.reached = gap.end+motions[gap.ports[0]]+motions[gap.ports[1]];
+            if (gap.isReflected)
+                gap.reached = max(gap.reached, 0.0);
         });
     }
 }
 
-void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupled,
-        const CoupledEquations::Demands& demands, const Loop& loop) {
+/**
+ * Find the part of each gap in an iteration.
+ *
+ * @param goingOn  the chains that need it
+ * @param all      whether the forces of all gaps are found
+ */
+void ReflectedGaps::findRoles(const vector<char>& goingOn, bool all) {
+    roles.assign(gaps.size(), Role::Apart);
+    hasPushed.assign(responses.getNumChains(), 0);
+    for (size_t i = 0; i < gaps.size(); i++) {
+        bool goesOn = all;
+        responses.forPorts(i, [&] (const GapResponses::ChainPorts& chain, int) {
+            goesOn |= goingOn[responses.numberOf(chain)];
+        });
+        if (!goesOn)
+            continue;
+        roles[i] = Role::Pushed;
+        responses.forPorts(i, [&] (const GapResponses::ChainPorts& chain, int) {
+            hasPushed[responses.numberOf(chain)] = 1;
+        });
+    }
+    for (size_t i = 0; i < gaps.size(); i++)
+        responses.forPorts(i, [&] (const GapResponses::ChainPorts& chain, int) {
+            if (roles[i] == Role::Apart && hasPushed[responses.numberOf(chain)])
+                roles[i] = Role::Beside;
+        });
+}
+
+/** Let the forces of gaps on each of their sides, which a function gives, move all ports of chains with pushed gaps. */
+template <class Function> void ReflectedGaps::moveAll(Function forceOf, const Loop& loop) {
+    motions.assign(responses.countPorts()+1, 0.0);
+    all.visit(false, loop, [&] (int i) {
+        for (int side = 0; side < 2 && roles[i] != Role::Apart; side++)
+            if (gaps[i].packOf(side) >= 0 && hasPushed[gaps[i].chainOf(side)] && forceOf(i, side) != 0)
+                moveChain(i, side, forceOf(i, side), false);
+        return 0.0;
+    });
+}
+
+void ReflectedGaps::push(const vector<PackStep*>& packs, const PackFlags& active, const vector<char>& goingOn,
+        CoupledEquations& coupled, const CoupledEquations::Demands& demands, const Loop& loop) {
     const size_t count = gaps.size();
     if (count == 0)
         return;
-    free.resize(count);
-    predicted.resize(count);
+    for (vector<double>* values : {&free, &predicted, &forces, &changes})
+        values->resize(count, 0.0);
+    for (vector<double>* values : {&corrections, &applied, &lacking})
+        values->resize(2*count, 0.0);
+    turned.assign(count, 0);
     const size_t first = firstEquations[0];
     responses.addPorts(gaps);
+    all.sort(count, responses);
+    findRoles(goingOn, false);
     if (!responses.isComplete() || bridges.size() != count*parts) {
         responses.find(gaps, firstEquations, packs, coupled, precision, demands.single, loop);
         const int needed = max(parts, chooseParts());
@@ -311,22 +430,47 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
             pushes.clear();
             ofBridges.clear();
             ofReflections.clear();
+            responses.takeForNew();
+            findRoles(goingOn, true);
         }
         parts = needed;
         pushes.resize(count*parts, 0.0);
         drawNumbers(loop);
         findNoise(loop);
+        findSharesAtStart(loop);
     }
-    auto endMove = [&] (size_t i, const vector<double>& moves) {
-        double sum = 0;
-        for (int lever = 0; lever < gaps[i].numLevers; lever++)
-            sum += dot(gaps[i].levers[lever].gradient, &moves[3*(firstEquations[i]+lever-first)]);
-        return sum;
+    auto moves = [&] (int i, int side) {
+        return gaps[i].packOf(side) >= 0 && active[gaps[i].packOf(side)];
     };
+    auto stays = [&] (int i, int side) {
+        return gaps[i].packOf(side) >= 0 && !active[gaps[i].packOf(side)] && hasPushed[gaps[i].chainOf(side)];
+    };
+    auto motionOf = [&] (int i, int side) {
+        return motions[responses.getPort(i, side)];
+    };
+    // What forces have made of chains that stay: the ends without them, as responses say.
+    moveAll([&] (int i, int side) {
+        return stays(i, side) ? applied[2*i+side] : 0;
+    }, loop);
     coupled.predictMoves(packs, first, loop);
-    corrections.resize(count, 0.0);
     runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
-        free[i] = gaps[i].end+endMove(i, coupled.getMoves())+corrections[i];
+        double unpushed = gaps[i].end;
+        for (int lever = 0; lever < gaps[i].numLevers; lever++)
+            unpushed += dot(gaps[i].levers[lever].gradient, &coupled.getMoves()[3*(firstEquations[i]+lever-first)]);
+        free[i] = unpushed;
+        for (int side = 0; side < 2; side++) {
+            double& lack = lacking[2*i+side];
+            if (moves(i, side)) {
+                free[i] += corrections[2*i+side];
+                lack = 0;
+            }
+            else if (stays(i, side)) {
+                lack = -motionOf(i, side);
+                free[i] += lack;
+            }
+        }
+        if (roles[i] == Role::Pushed)
+            predicted[i] = unpushed;
     });
     findPushes(loop);
     vector<double> loads(3*(firstEquations[count]-first));
@@ -335,22 +479,35 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
             for (int k = 0; k < 3; k++)
                 loads[3*(firstEquations[i]+lever-first)+k] = forces[i]*gaps[i].levers[lever].gradient[k];
     coupled.push(packs, first, loads, demands, loop);
-    changes.resize(count, 0.0);
-    motions.assign(responses.countPorts()+1, MotionOfPort());
-    all.visit(false, loop, [&] (int i) {
-        if (forces[i] != 0)
-            move(i, forces[i], false);
-        return 0.0;
-    });
+    moveAll([&] (int i, int) {
+        return forces[i];
+    }, loop);
     runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
-        const double pushed = endMove(i, coupled.getPushedMoves());
-        predicted[i] = free[i]-corrections[i]+pushed;
-        // Responses may be those of an iteration before, and others push through links.
-        const double correction = pushed-motions[inPart[i].ports[0]].all-motions[inPart[i].ports[1]].all;
-        const double change = correction-corrections[i];
+        double ofSides[2] = {}, pushed = 0;
+        for (int side = 0; side < 2; side++) {
+            if (stays(i, side))
+                lacking[2*i+side] += motionOf(i, side);
+            if (!moves(i, side))
+                continue;
+            applied[2*i+side] = forces[i];
+            if (!hasPushed[gaps[i].chainOf(side)])
+                continue;
+            double way = 0;
+            for (int lever = 0; lever < gaps[i].numLevers; lever++)
+                way += dot(gaps[i].levers[lever].gradient, coupled.getPushedMove(firstEquations[i]+lever, side).data());
+            way = side == 0 ? way : -way;
+            pushed += way;
+            // Responses may be those of an iteration before, and others push through links.
+            ofSides[side] = way-motionOf(i, side)-corrections[2*i+side];
+        }
+        const double change = ofSides[0]+ofSides[1];
         const bool isBack = coupled.joinsPlaces() && change*changes[i] < 0;
-        corrections[i] += isBack ? DAMPING_OF_GAPS*change : change;
+        for (int side = 0; side < 2; side++)
+            corrections[2*i+side] += isBack ? DAMPING_OF_GAPS*ofSides[side] : ofSides[side];
+        if (roles[i] != Role::Pushed)
+            return;
         changes[i] = change;
+        predicted[i] += pushed+lacking[2*i]+lacking[2*i+1];
     });
 }
 
@@ -379,7 +536,9 @@ bool ReflectedGaps::deviates(int i, double share) const {
         return false;
     if (i >= (int) predicted.size())
         return wouldPush(gaps[i]);
-    return !(max(fabs(gaps[i].end-predicted[i]), fabs(changes[i])) <= share*scaleOf(i)+LEAST_CHANGE_OF_GAPS);
+    const double *const lack = &lacking[2*(size_t) i], end = gaps[i].end+lack[0]+lack[1];
+    return !(max({fabs(end-predicted[i]), fabs(changes[i]), fabs(lack[0]), fabs(lack[1])}) <=
+            share*scaleOf(i)+LEAST_CHANGE_OF_GAPS);
 }
 
 bool ReflectedGaps::anyUnfinished() {
@@ -393,6 +552,19 @@ bool ReflectedGaps::anyUnfinished() {
             responses.forget(i);
     }
     return any;
+}
+
+void ReflectedGaps::markUnfinished(vector<char>& chains) const {
+    for (size_t i = 0; i < gaps.size(); i++) {
+        // Those that have just been found or turned, or have become none, change what chains are pushed by.
+        const bool isOther = i >= predicted.size() || turned[i] || (!gaps[i].present && forces[i] != 0);
+        for (int side = 0; side < 2 && (isOther || isUnfinished(i)); side++)
+            if (gaps[i].packOf(side) >= 0)
+                chains[gaps[i].chainOf(side)] = 1;
+    }
+    for (int chain : responses.getChains())
+        if (!responses.isComplete(chain))
+            chains[chain] = 1;
 }
 
 /**

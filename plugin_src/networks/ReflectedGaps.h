@@ -49,6 +49,8 @@ public:
     Gap& get(int number) {
         return gaps[number];
     }
+    /** Take another one in place of a gap, whose places or gradients have changed. */
+    void turn(int number, const Gap& gap);
     const Gap& get(int number) const {
         return gaps[number];
     }
@@ -57,12 +59,26 @@ public:
     }
     /** Add an equation for each gap: it has no force yet, but places. */
     void addEquations(std::vector<CouplingEquation>& equations);
-    /** Find the forces, and let the equations of an iteration take them, which have been solved without. */
-    void push(const std::vector<PackStep*>& packs, CoupledEquations& coupled, const CoupledEquations::Demands& demands,
-            const Loop& loop);
+    /**
+     * Find the forces, and let the equations of an iteration take them, which have been solved without.
+     *
+     * Forces are found of gaps on chains that go on. Chains of packs that take no part stay where they are: what forces
+     * that change would move there is known from their responses, and must be little.
+     *
+     * @param active   the packs that take part in the iteration
+     * @param goingOn  the chains in them that need it; all if any gaps have just been found
+     */
+    void push(const std::vector<PackStep*>& packs, const PackFlags& active, const std::vector<char>& goingOn,
+            CoupledEquations& coupled, const CoupledEquations::Demands& demands, const Loop& loop);
     /** Whether a gap is not where the equations have led it, after its end has been found there. */
     bool isUnfinished(int number) const;
     bool anyUnfinished();
+    /** Whether packs that have converged may rest: where no links join chains, whose responses are known then. */
+    bool allowRests() const {
+        return !responses.haveLinks();
+    }
+    /** Mark the chains that need another iteration, after anyUnfinished(). */
+    void markUnfinished(std::vector<char>& chains) const;
     /** Mark the chains of gaps that are unfinished. */
     void findFailures(std::vector<bool>& failed) const;
     /** The force of a gap, the mean over the step: per length if its gradient is one. */
@@ -74,11 +90,16 @@ private:
     void drawNumbers(const Loop& loop);
     void correlate(const std::vector<double>& normals, std::vector<double>& sums, const Loop& loop) const;
     void findNoise(const Loop& loop);
+    void findRoles(const std::vector<char>& goingOn, bool all);
+    template <class Function> void moveAll(Function forceOf, const Loop& loop);
     void findPushes(const Loop& loop);
     void findPushesOfPart(int part, const Loop& loop);
     double findPush(int gap, int part) const;
     double findPushOfSpring(int gap, int part, double end) const;
     void move(int gap, double push, bool reflects);
+    void moveChain(int gap, int side, double push, bool reflects);
+    void noteMotion(int gap);
+    void findSharesAtStart(const Loop& loop);
     double scaleOf(int gap) const;
     bool wouldPush(const Gap& gap) const;
     bool isTorn(int gap) const;
@@ -90,10 +111,22 @@ private:
     Precision precision = Precision::Double;
     int parts = 1;
     /**
-     * For each gap: the force and its share in each part; the end without forces, that which is predicted, and how much
-     * farther forces have moved it than responses say, and by how much that has changed in the last iteration.
+     * For each gap: the force and its share in each part; the end without forces, that which is predicted, and by how
+     * much corrections have changed in the last iteration.
      */
-    std::vector<double> forces, pushes, free, predicted, corrections, changes;
+    std::vector<double> forces, pushes, free, predicted, changes;
+    /**
+     * For each side of each gap: how much farther forces have moved it than responses say; the force that its chain had
+     * when it moved last, and how far forces would have moved it since.
+     */
+    std::vector<double> corrections, applied, lacking;
+    /** Whether each gap has got other places or gradients since forces were found. */
+    std::vector<char> turned;
+    /** What an iteration makes of a gap: its force is found, or it shares a chain with such, or it does not. */
+    enum class Role : char {Pushed, Beside, Apart};
+    std::vector<Role> roles;
+    /** For each chain, whether it has a gap whose force is found. */
+    std::vector<char> hasPushed;
     /** The first equation of each gap, and one behind those of all. */
     std::vector<std::size_t> firstEquations;
     GapResponses responses;
@@ -102,6 +135,8 @@ private:
     /** A gap in a part of the step: where it begins and would end without forces, and the force that is found. */
     struct GapInPart {
         double start, end, response, ofChains, variate, tolerance, push;
+        /** The end of the part, where the next one begins. */
+        double reached;
         /** Those that it does not have are behind all others, and do not move. */
         int ports[2];
         bool isReflected;
@@ -109,11 +144,12 @@ private:
     std::vector<GapInPart> inPart;
     /** All gaps, and those that are pushed in a part. */
     GapColors all, pushed;
-    /** How far forces move a port in a part, and what of those on other gaps counts at its start. */
-    struct MotionOfPort {
-        double all = 0, atStart = 0;
-    };
-    std::vector<MotionOfPort> motions;
+    /** For each port, how far forces move it in a part, and what of those on other gaps counts at its start. */
+    std::vector<double> motions, motionsAtStart;
+    /** Whether that has changed since its gap was looked at. */
+    std::vector<char> haveMoved;
+    /** For each chain, how far a force on each port moves all others at the start of a part. */
+    std::vector<std::vector<double> > sharesAtStart;
 };
 
 } // namespace cylchain
