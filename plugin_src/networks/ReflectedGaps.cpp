@@ -370,32 +370,27 @@ void ReflectedGaps::findPushes(const Loop& loop) {
     }
 }
 
-/**
- * Find the part of each gap in an iteration.
- *
- * @param goingOn  the chains that need it
- * @param all      whether the forces of all gaps are found
- */
-void ReflectedGaps::findRoles(const vector<char>& goingOn, bool all) {
+/** Find the part of each gap in an iteration from the chains that need it. */
+void ReflectedGaps::findRoles(const vector<char>& goingOn) {
     roles.assign(gaps.size(), Role::Apart);
     hasPushed.assign(responses.getNumChains(), 0);
-    for (size_t i = 0; i < gaps.size(); i++) {
-        bool goesOn = all;
-        responses.forPorts(i, [&] (const GapResponses::ChainPorts& chain, int) {
-            goesOn |= goingOn[responses.numberOf(chain)];
+    auto anyChainIs = [&] (int gap, const vector<char>& marks) {
+        bool result = false;
+        responses.forPorts(gap, [&] (const GapResponses::ChainPorts& chain, int) {
+            result |= marks[responses.numberOf(chain)] != 0;
         });
-        if (!goesOn)
-            continue;
-        roles[i] = Role::Pushed;
-        responses.forPorts(i, [&] (const GapResponses::ChainPorts& chain, int) {
-            hasPushed[responses.numberOf(chain)] = 1;
-        });
-    }
+        return result;
+    };
     for (size_t i = 0; i < gaps.size(); i++)
-        responses.forPorts(i, [&] (const GapResponses::ChainPorts& chain, int) {
-            if (roles[i] == Role::Apart && hasPushed[responses.numberOf(chain)])
-                roles[i] = Role::Beside;
-        });
+        if (anyChainIs(i, goingOn)) {
+            roles[i] = Role::Pushed;
+            responses.forPorts(i, [&] (const GapResponses::ChainPorts& chain, int) {
+                hasPushed[responses.numberOf(chain)] = 1;
+            });
+        }
+    for (size_t i = 0; i < gaps.size(); i++)
+        if (roles[i] == Role::Apart && anyChainIs(i, hasPushed))
+            roles[i] = Role::Beside;
 }
 
 /** Let the forces of gaps on each of their sides, which a function gives, move all ports of chains with pushed gaps. */
@@ -409,85 +404,81 @@ template <class Function> void ReflectedGaps::moveAll(Function forceOf, const Lo
     });
 }
 
-void ReflectedGaps::push(const vector<PackStep*>& packs, const PackFlags& active, const vector<char>& goingOn,
-        CoupledEquations& coupled, const CoupledEquations::Demands& demands, const Loop& loop) {
+/** Find the responses and random numbers that are not known. */
+void ReflectedGaps::complete(const vector<PackStep*>& packs, CoupledEquations& coupled, bool single,
+        const Loop& loop) {
     const size_t count = gaps.size();
-    if (count == 0)
+    if (responses.isComplete() && bridges.size() == count*parts)
         return;
-    for (vector<double>* values : {&free, &predicted, &forces, &changes})
-        values->resize(count, 0.0);
-    for (vector<double>* values : {&corrections, &applied, &lacking})
-        values->resize(2*count, 0.0);
-    turned.assign(count, 0);
-    const size_t first = firstEquations[0];
-    responses.addPorts(gaps);
-    all.sort(count, responses);
-    findRoles(goingOn, false);
-    if (!responses.isComplete() || bridges.size() != count*parts) {
-        responses.find(gaps, firstEquations, packs, coupled, precision, demands.single, loop);
-        const int needed = max(parts, chooseParts());
-        if (needed != parts) {
-            pushes.clear();
-            ofBridges.clear();
-            ofReflections.clear();
-            responses.takeForNew();
-            findRoles(goingOn, true);
-        }
-        parts = needed;
-        pushes.resize(count*parts, 0.0);
-        drawNumbers(loop);
-        findNoise(loop);
-        findSharesAtStart(loop);
+    responses.find(gaps, firstEquations, packs, coupled, precision, single, loop);
+    const int needed = max(parts, chooseParts());
+    if (needed != parts) {
+        pushes.clear();
+        ofBridges.clear();
+        ofReflections.clear();
+        responses.takeForNew();
+        roles.assign(count, Role::Pushed);
+        hasPushed.assign(responses.getNumChains(), 1);
     }
-    auto moves = [&] (int i, int side) {
-        return gaps[i].packOf(side) >= 0 && active[gaps[i].packOf(side)];
-    };
-    auto stays = [&] (int i, int side) {
-        return gaps[i].packOf(side) >= 0 && !active[gaps[i].packOf(side)] && hasPushed[gaps[i].chainOf(side)];
-    };
-    auto motionOf = [&] (int i, int side) {
-        return motions[responses.getPort(i, side)];
-    };
-    // What forces have made of chains that stay: the ends without them, as responses say.
+    parts = needed;
+    pushes.resize(count*parts, 0.0);
+    drawNumbers(loop);
+    findNoise(loop);
+    findSharesAtStart(loop);
+}
+
+/** Whether the chain of a gap's side takes part in the iteration. */
+bool ReflectedGaps::takesPart(int i, int side) const {
+    return gaps[i].packOf(side) >= 0 && (*active)[gaps[i].packOf(side)];
+}
+
+/** Whether it does not, and has a gap whose force is found. */
+bool ReflectedGaps::waits(int i, int side) const {
+    return gaps[i].packOf(side) >= 0 && !takesPart(i, side) && hasPushed[gaps[i].chainOf(side)];
+}
+
+/** How far the forces of moveAll() have moved a gap's side. */
+double ReflectedGaps::motionOf(int i, int side) const {
+    return motions[responses.getPort(i, side)];
+}
+
+/** Find where gaps end without their forces. */
+void ReflectedGaps::findFreeEnds(const CoupledEquations& coupled, const Loop& loop) {
     moveAll([&] (int i, int side) {
-        return stays(i, side) ? applied[2*i+side] : 0;
+        return waits(i, side) ? applied[2*i+side] : 0;
     }, loop);
-    coupled.predictMoves(packs, first, loop);
-    runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
-        double unpushed = gaps[i].end;
+    runInChunks(loop, gaps.size(), CHUNK_OF_GAPS, [&] (int i) {
+        double ofWaiting = 0, ofOthers = 0;
+        for (int side = 0; side < 2; side++)
+            if (takesPart(i, side)) {
+                lacking[2*i+side] = 0;
+                ofOthers += corrections[2*i+side];
+            }
+            else if (waits(i, side)) {
+                lacking[2*i+side] = -motionOf(i, side);
+                ofWaiting += lacking[2*i+side];
+            }
+        if (roles[i] != Role::Pushed)
+            return;
+        predicted[i] = gaps[i].end;
         for (int lever = 0; lever < gaps[i].numLevers; lever++)
-            unpushed += dot(gaps[i].levers[lever].gradient, &coupled.getMoves()[3*(firstEquations[i]+lever-first)]);
-        free[i] = unpushed;
-        for (int side = 0; side < 2; side++) {
-            double& lack = lacking[2*i+side];
-            if (moves(i, side)) {
-                free[i] += corrections[2*i+side];
-                lack = 0;
-            }
-            else if (stays(i, side)) {
-                lack = -motionOf(i, side);
-                free[i] += lack;
-            }
-        }
-        if (roles[i] == Role::Pushed)
-            predicted[i] = unpushed;
+            predicted[i] += dot(gaps[i].levers[lever].gradient,
+                    &coupled.getMoves()[3*(firstEquations[i]+lever-firstEquations[0])]);
+        free[i] = predicted[i]+ofOthers+ofWaiting;
     });
-    findPushes(loop);
-    vector<double> loads(3*(firstEquations[count]-first));
-    for (size_t i = 0; i < count; i++)
-        for (int lever = 0; lever < gaps[i].numLevers; lever++)
-            for (int k = 0; k < 3; k++)
-                loads[3*(firstEquations[i]+lever-first)+k] = forces[i]*gaps[i].levers[lever].gradient[k];
-    coupled.push(packs, first, loads, demands, loop);
+}
+
+/** Find where the equations lead gaps with their forces, and what responses lack of that. */
+void ReflectedGaps::predictEnds(const CoupledEquations& coupled, const Loop& loop) {
     moveAll([&] (int i, int) {
         return forces[i];
     }, loop);
-    runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
-        double ofSides[2] = {}, pushed = 0;
+    runInChunks(loop, gaps.size(), CHUNK_OF_GAPS, [&] (int i) {
+        double more[2] = {}, pushed = 0;
         for (int side = 0; side < 2; side++) {
-            if (stays(i, side))
+            if (waits(i, side))
                 lacking[2*i+side] += motionOf(i, side);
-            if (!moves(i, side))
+            if (!takesPart(i, side))
                 continue;
             applied[2*i+side] = forces[i];
             if (!hasPushed[gaps[i].chainOf(side)])
@@ -498,17 +489,45 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, const PackFlags& active
             way = side == 0 ? way : -way;
             pushed += way;
             // Responses may be those of an iteration before, and others push through links.
-            ofSides[side] = way-motionOf(i, side)-corrections[2*i+side];
+            more[side] = way-motionOf(i, side)-corrections[2*i+side];
         }
-        const double change = ofSides[0]+ofSides[1];
+        const double change = more[0]+more[1];
         const bool isBack = coupled.joinsPlaces() && change*changes[i] < 0;
         for (int side = 0; side < 2; side++)
-            corrections[2*i+side] += isBack ? DAMPING_OF_GAPS*ofSides[side] : ofSides[side];
+            corrections[2*i+side] += isBack ? DAMPING_OF_GAPS*more[side] : more[side];
         if (roles[i] != Role::Pushed)
             return;
         changes[i] = change;
         predicted[i] += pushed+lacking[2*i]+lacking[2*i+1];
     });
+}
+
+void ReflectedGaps::push(const vector<PackStep*>& packs, const PackFlags& newActive, const vector<char>& goingOn,
+        CoupledEquations& coupled, const CoupledEquations::Demands& demands, const Loop& loop) {
+    const size_t count = gaps.size();
+    if (count == 0)
+        return;
+    active = &newActive;
+    for (vector<double>* values : {&free, &predicted, &forces, &changes})
+        values->resize(count, 0.0);
+    for (vector<double>* values : {&corrections, &applied, &lacking})
+        values->resize(2*count, 0.0);
+    turned.assign(count, 0);
+    const size_t first = firstEquations[0];
+    responses.addPorts(gaps);
+    all.sort(count, responses);
+    findRoles(goingOn);
+    complete(packs, coupled, demands.single, loop);
+    coupled.predictMoves(packs, first, loop);
+    findFreeEnds(coupled, loop);
+    findPushes(loop);
+    vector<double> loads(3*(firstEquations[count]-first));
+    for (size_t i = 0; i < count; i++)
+        for (int lever = 0; lever < gaps[i].numLevers; lever++)
+            for (int k = 0; k < 3; k++)
+                loads[3*(firstEquations[i]+lever-first)+k] = forces[i]*gaps[i].levers[lever].gradient[k];
+    coupled.push(packs, first, loads, demands, loop);
+    predictEnds(coupled, loop);
 }
 
 /** Whether a gap that no iteration knows of yet may be pushed. */

@@ -66,14 +66,14 @@ public:
      * that change would move there is known from their responses, and must be little.
      *
      * @param active   the packs that take part in the iteration
-     * @param goingOn  the chains in them that need it; all if any gaps have just been found
+     * @param goingOn  the chains in them that need it, among them those of gaps that have just been found
      */
     void push(const std::vector<PackStep*>& packs, const PackFlags& active, const std::vector<char>& goingOn,
             CoupledEquations& coupled, const CoupledEquations::Demands& demands, const Loop& loop);
     /** Whether a gap is not where the equations have led it, after its end has been found there. */
     bool isUnfinished(int number) const;
     bool anyUnfinished();
-    /** Whether packs that have converged may rest: where no links join chains, whose responses are known then. */
+    /** Whether packs that have converged may rest: one place of a link must not move alone while gaps push it. */
     bool allowRests() const {
         return !responses.haveLinks();
     }
@@ -90,8 +90,14 @@ private:
     void drawNumbers(const Loop& loop);
     void correlate(const std::vector<double>& normals, std::vector<double>& sums, const Loop& loop) const;
     void findNoise(const Loop& loop);
-    void findRoles(const std::vector<char>& goingOn, bool all);
+    void findRoles(const std::vector<char>& goingOn);
+    void complete(const std::vector<PackStep*>& packs, CoupledEquations& coupled, bool single, const Loop& loop);
+    bool takesPart(int gap, int side) const;
+    bool waits(int gap, int side) const;
+    double motionOf(int gap, int side) const;
     template <class Function> void moveAll(Function forceOf, const Loop& loop);
+    void findFreeEnds(const CoupledEquations& coupled, const Loop& loop);
+    void predictEnds(const CoupledEquations& coupled, const Loop& loop);
     void findPushes(const Loop& loop);
     void findPushesOfPart(int part, const Loop& loop);
     double findPush(int gap, int part) const;
@@ -110,6 +116,8 @@ private:
     double kT = 0;
     Precision precision = Precision::Double;
     int parts = 1;
+    /** The packs that take part in an iteration. */
+    const PackFlags* active = nullptr;
     /**
      * For each gap: the force and its share in each part; the end without forces, that which is predicted, and by how
      * much corrections have changed in the last iteration.

@@ -203,7 +203,7 @@ private:
         solve(equations);
         coupled.predictMoves(packs, firstGap, SERIAL);
         freeEnd = gaps.get(0).end+along(0, coupled.getMoves().data());
-        gaps.push(packs, coupled, demands, SERIAL);
+        gaps.push(packs, PackFlags(packs.size(), 1), vector<char>(places.getNumChains(), 1), coupled, demands, SERIAL);
         coupled.advance(packs, PackFlags(packs.size(), 1), ShareOfChange(), unfinished, SERIAL);
     }
     double along(int gap, const double* moves) const {

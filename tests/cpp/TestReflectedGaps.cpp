@@ -115,7 +115,7 @@ public:
         LaneFlags unfinished;
         unfinished.emplace_back(new bool[count]);
         coupled.solve(packs, active, equations, settings.kT, demands, SERIAL);
-        gaps.push(packs, coupled, demands, SERIAL);
+        gaps.push(packs, active, vector<char>(places.getNumChains(), 1), coupled, demands, SERIAL);
         coupled.advance(packs, active, ShareOfChange(), unfinished, SERIAL);
         const Array begun = x;
         pack.getPositions(begun.data(), x.data());
