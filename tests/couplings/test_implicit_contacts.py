@@ -189,6 +189,29 @@ def test_contacts_that_nothing_touches_change_little():
     assert np.abs(results[0] - results[1]).max() < 0.02
 
 
+def _pressed_together(order, step):
+    """Where 90 filaments that overlap are after three steps without noise, by their numbers in the order of one run."""
+    generator = np.random.default_rng(3)
+    starts, directions = generator.uniform(0, 900, (90, 3)), generator.normal(size=(90, 3))
+    filaments = Filaments(VISCOSITY, 0)
+    for number in order:
+        filaments.add_straight(ACTIN, 5, starts[number], directions[number])
+    _, system, positions = filaments.build()
+    system.addForce(capsule_contact_force(filaments, system, DIAMETER, STIFFNESS))
+    context = _context(filaments, system, positions, step)
+    context.getIntegrator().step(3)
+    assert context.getIntegrator().getNumDividedSteps() == 0
+    return positions_of(context)[np.array(filaments.node_indices)][np.argsort(order)]
+
+
+@pytest.mark.parametrize("step", [1e5, 2e5])
+def test_filaments_that_have_converged_before_others_go_where_they_would_with_these(step):
+    """Which filaments rest while others go on depends on who shares a vector of the processor: on their order."""
+    first = _pressed_together(np.arange(90), step)
+    other = _pressed_together(np.random.default_rng(1).permutation(90), step)
+    assert np.abs(first - other).max() < 1e-6
+
+
 # Where steps go wrong
 
 
