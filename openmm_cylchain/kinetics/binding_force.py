@@ -180,8 +180,8 @@ def _add_hand(force, hand, filaments, name):
             if not has_twist(filaments[i].type):
                 raise InputError(
                     f"Linkers {name!r}: a hand follows a helix, but binds to filament {i} "
-                    f"({filaments[i].type.name}), which has no twist: give its type a twist_persistence_length, or name "
-                    "others in binds_to."
+                    f"({filaments[i].type.name}), which has no twist: give its type a twist_persistence_length, or "
+                    "name others in binds_to."
                 )
         own = hand.helix
         force.setHandOnHelix(number, own.pitch, own.rotational_friction, own.stall_torque or 0.0, own.torque_range)

@@ -15,9 +15,9 @@ class HandOnHelix:
     Where it is bound, the hand turns about the filament as the material does there; and as it walks by dx, by
     ``(2 pi/pitch + (m - m0)/l0) dx`` more, with the twist m of the joint there, m0 at rest. Against all this is its
     ``rotational_friction``, with the noise that belongs to it. A hand that hardly turns has the filament turn in its
-    place: it is overwound ahead, and underwound behind, by one turn for each pitch (Liu and Wang, Proc. Natl. Acad. Sci.
-    USA 1987, 84, 7024). Turns are those about the filament, without what its direction makes of them: the filament
-    carries the hand along as it bends. The whole of the filament keeps its linking number.
+    place: it is overwound ahead, and underwound behind, by one turn for each pitch (Liu and Wang, Proc. Natl. Acad.
+    Sci. USA 1987, 84, 7024). Turns are those about the filament, without what its direction makes of them: the
+    filament carries the hand along as it bends. The whole of the filament keeps its linking number.
 
     Parameters
     ----------

@@ -54,6 +54,45 @@ def test_a_resumed_run_is_the_same(wound, tmp_path, monkeypatch):
         assert (tmp_path / "out" / name).read_bytes() == (wound / name).read_bytes()
 
 
+POLYMERASE = """
+[[linkers]]
+name = "polymerase"
+count = 2
+volume = "1 um^3"
+stiffness = "1 pN/nm"
+bound_at = [{ filament = [0, 1], arc_length = "40 nm" }]
+[[linkers.hands]]
+binding_rate = "0 1/s"
+reach = "10 nm"
+unbinding_rate = "0 1/s"
+speed = "5 um/ms"
+helix = { pitch = "3.57 nm", rotational_friction = "1 pN*nm*s", stall_torque = "11 pN*nm" }
+[[linkers.hands]]
+binding_rate = "0 1/s"
+reach = "10 nm"
+unbinding_rate = "0 1/s"
+[[stage]]
+"""
+
+
+def test_hands_that_follow_the_helix(tmp_path, monkeypatch):
+    text = WOUND.replace("[[stage]]", POLYMERASE, 1)
+    kind = parse_configuration(text).linkers[0].kind
+    assert kind.hands[0].helix.stall_torque == pytest.approx(11.0 * 0.602214, rel=1e-5)
+    assert kind.hands[0].helix.torque_range == 100.0 and kind.hands[1].helix is None
+    (tmp_path / "whole").mkdir()
+    assert main(_run(text, tmp_path / "whole")) == 0
+    stop_and_resume(_run(text, tmp_path), monkeypatch, checkpoints=3)
+    for name in ("twist.csv", "linkers.csv", "trajectory.dcd"):
+        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "whole" / "out" / name).read_bytes()
+    with pytest.raises(ConfigurationError, match="pitch"):
+        parse_configuration(text.replace('"3.57 nm"', '"0 nm"'))
+    with pytest.raises(ConfigurationError, match="no twist"):
+        own = text.replace('[[end_frame]]\ntable = 1\nend = "minus"\ndirection = [0, 0, 1]\n', "")
+        own = own[: own.index("[[end_frame]]")] + own[own.index("[[pull]]") : own.index("[stage.end_frame")]
+        create_simulation(parse_configuration(own.replace('twist_persistence_length = "100 nm"\n', "")))
+
+
 def test_a_torsional_rigidity_in_place_of_a_length():
     def kind(*lines):
         own = WOUND.replace('twist_persistence_length = "100 nm"', "\n".join(lines))

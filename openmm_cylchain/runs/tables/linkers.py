@@ -120,7 +120,7 @@ _HELIX_EXAMPLE = '{ pitch = "3.57 nm", rotational_friction = "1 pN*nm*s", stall_
 _HELIX = TableKind(
     "helix",
     (
-        Key("pitch", Quantity(units.LENGTH, "any"), REQUIRED, "Length of a turn of the helix; left-handed if negative."),
+        Key("pitch", Quantity(units.LENGTH, "any"), REQUIRED, "Length of a turn; left-handed if negative."),
         Key(
             "rotational_friction",
             Quantity(units.ROTATIONAL_FRICTION, "zero"),
