@@ -22,8 +22,8 @@ struct HandOnHelix {
  *
  * The frame of the chain at a hand is the mean of those of the two segments between whose middles it is. A hand that
  * follows the helix turns about the chain with this frame, and, as it walks, by 2 pi for each pitch and by the twist
- * beyond rest from where it was to where it is. With the frame at the end of a step, and twists at its start, no part of
- * the turns is left out, whatever the step is.
+ * beyond rest from where it was to where it is. With the frame at the end of a step, and twists at its start, no part
+ * of the turns is left out, whatever the step is.
  */
 struct TwistedContour {
     const Contours& contours;

@@ -191,8 +191,8 @@ public:
      * as they walk.
      *
      * @param hand         the index of the kind, which has neither sites nor friction of sliding
-     * @param pitch        the length of a turn of the helix at rest, negative if it is left-handed, measured in nm; or 0
-     *                     of hands that follow none
+     * @param pitch        the length of a turn of the helix at rest, negative if it is left-handed, measured in nm; or
+     *                     0 of hands that follow none
      * @param friction     against turning about the filament, measured in kJ ps/mol
      * @param stallTorque  the torque of the filament that stops it, measured in kJ/mol, or 0 if none changes its speed
      * @param range        from how far on either side the torque is known, measured in nm
