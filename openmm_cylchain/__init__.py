@@ -69,6 +69,7 @@ from .kinetics.crosslinker import Crosslinker
 from .kinetics.growth_force import FilamentGrowth
 from .kinetics.hand import Hand
 from .kinetics.hand_at_end import HandAtEnd
+from .kinetics.hand_on_helix import HandOnHelix
 from .kinetics.linker_table import LinkerTable
 from .kinetics.nucleation import Nucleation
 from .kinetics.presets import ALPHA_ACTININ, COHESIN, CONDENSIN, DYNEIN, FILAMIN, KINESIN_1, KINESIN_13, MYOSIN_II
@@ -137,6 +138,7 @@ __all__ = [
     "GrowthReporter",
     "Hand",
     "HandAtEnd",
+    "HandOnHelix",
     "INSTABILITY_IN_MITOSIS",
     "InputError",
     "InstabilityError",

@@ -44,6 +44,7 @@ CASES = [
     ("force_extension", "dna", 200, 100, 24 * 21, 24 * 20),
     ("magnetic_tweezers", "tweezers", 200, 100, 22 * 41, 22 * 40),
     ("cyclisation", "loops", 200, 100, 42 * (46 + 4), 42 * 46),
+    ("twin_domains", "domains", 60, 60, 161, 160),
     ("supercoiled_plasmid", "plasmids", 60, 60, 3 * 120, 3 * 120),
 ]
 # The others are slow tests.

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..filaments.twist import has_twist
 from ..output.dcd_frames import DCDFrames
 from ..output.files import as_path
 from ..output.read_tables import read_reports, read_table
@@ -58,6 +59,7 @@ def load(path: str | Path, incomplete: bool = False) -> Run:
     description = read_run_description(files.description)
     needed = [files.topology, files.trajectory, files.energies]
     needed += [files.linkers, files.linker_places] if description.linkers else []
+    needed += [files.twists] if any(has_twist(own.type) for own in description.filaments) else []
     for file in needed:
         if not file.exists():
             raise InputError(f"{path} lacks {file.name}: the run has not begun, or its files were moved.")
@@ -107,4 +109,6 @@ def _whole_frames(files, description):
     for path in (files.pulling, files.twist, files.growth, files.wall_forces, files.contact_forces):
         if path.exists():
             frames = min(frames, len(read_reports(path)["step"]))
+    if files.twists.exists():
+        frames = min(frames, len(read_records(files.twists)))
     return frames, energies

@@ -17,6 +17,8 @@ from ..couplings.crosslink_records import CROSSLINK_RECORD, CrosslinkFrame, cros
 from ..couplings.shapes import Box, Capsule, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, Torus
 from ..errors import InputError, PrecisionWarning
 from ..filaments.grown import GrownChain
+from ..filaments.twist import has_twist
+from ..mechanics.material_frames import material_vectors
 from ..output.dcd_frames import DCDFrames
 from ..output.linker_records import LINKER_RECORD
 from ..output.read_tables import read_growth, read_reports
@@ -30,6 +32,7 @@ from .run_filaments import PIECES_OF_ELEMENT, RunParticles, chain_of, described_
 from .run_topology import read_topology
 
 _COARSE = 0.2
+_NONE = np.zeros((0, 3))
 _SHAPES = {
     "plane": lambda point, vector, length: Plane(point, vector),
     "slab": Slab,
@@ -155,6 +158,29 @@ class Run:
         """Twist and torque of filaments with end frames: (frames, such filaments) arrays by the headers of
         ``twist.csv``, empty without such."""
         return self._by_frame(self._files.twist)
+
+    @cached_property
+    def _twist_records(self):
+        return read_records(self._files.twists)
+
+    def twists(self, frame: int) -> list[FloatArray]:
+        """Twists in radians of each filament in a frame, as ``FilamentsInContext.twists`` has them: none of one
+        without twist."""
+        frame = self._frame(frame)
+        counts = [len(own.nodes) if has_twist(own.type) else 0 for own in self.filaments]
+        if not any(counts):
+            return [np.zeros(0)] * len(counts)
+        record = self._twist_records[np.searchsorted(self._twist_records["step"], self.steps[frame])]
+        return np.split(np.array(record["twists"]), np.cumsum(counts)[:-1])
+
+    def material_frames(self, frame: int) -> list[FloatArray]:
+        """Unit vectors (segments, 3) across the segments of each filament in a frame that turn with the material:
+        none of a filament without twist. They are those of a filament that is not twisted at rest. That of the first
+        segment begins anywhere."""
+        return [
+            material_vectors(nodes, own.ring, twists, own.type.rest_twist) if len(twists) * len(nodes) else _NONE
+            for own, nodes, twists in zip(self.filaments, self.nodes(frame), self.twists(frame))
+        ]
 
     @cached_property
     def growth(self) -> dict[str, FloatArray]:

@@ -3,12 +3,15 @@
 from pathlib import Path
 
 import numpy as np
+import scipy
 
 from ..analysis.runs import Run
 from ..errors import InputError
+from ..mechanics.geometry import segment_vectors
 from .drawn import check_path, spring_labels, thickness, visible_diameter, walls
 
 _ANGSTROM = 10.0  # in a nm
+_UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 _NO_BONDS = np.zeros((0, 2), dtype=int)
 
 
@@ -19,7 +22,8 @@ def write_ovito(run: Run, path: str | Path) -> None:
     of their types and radii; bonds are segments and springs, so that their number changes from frame to frame. Beam
     elements are drawn by points of their curve. Particles beside filaments have their name and radius. Lines on
     walls are particles and bonds of the type "wall". ``time_ps`` is an attribute of each frame, beside its step.
-    Without a periodic box, the cell is three times as wide as what it holds.
+    Without a periodic box, the cell is three times as wide as what it holds. Nodes of filaments with twist have
+    orientations: z is along the segment behind a node, before it at the last one, and x turns with the material.
 
     Parameters
     ----------
@@ -89,6 +93,10 @@ def write_ovito(run: Run, path: str | Path) -> None:
                 snapshot.particles.typeid = np.concatenate(particle_types)
                 snapshot.particles.position = _ANGSTROM * (np.concatenate(positions) - center)
                 snapshot.particles.diameter = _ANGSTROM * np.concatenate(widths)
+                if any(len(own) for own in run.twists(frame)):
+                    snapshot.particles.orientation = np.concatenate(
+                        [*_orientations(run, frame), np.tile(_UPRIGHT, (count - len(types), 1))]
+                    )
                 snapshot.bonds.N = sum(len(own) for own in bonds)
                 snapshot.bonds.types = names + springs + walls_there
                 snapshot.bonds.group = np.concatenate(bonds)
@@ -98,6 +106,19 @@ def write_ovito(run: Run, path: str | Path) -> None:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _orientations(run, frame):
+    # Quaternions (w, x, y, z) of the points of each filament.
+    for own, points, across in zip(run.filaments, run.curves(frame), run.material_frames(frame)):
+        if not len(across):
+            yield np.tile(_UPRIGHT, (len(points), 1))
+            continue
+        along = segment_vectors(points, own.ring)
+        along = along / np.linalg.norm(along, axis=1, keepdims=True)
+        axes = np.stack([across, np.cross(along, across), along], axis=2)
+        found = scipy.spatial.transform.Rotation.from_matrix(axes).as_quat()[:, [3, 0, 1, 2]]
+        yield found if own.ring else np.vstack([found, found[-1:]])
 
 
 def _joined(lines):

@@ -11,6 +11,7 @@ from ..couplings.beam_curves import BeamCurves
 from ..engine_choice import load_plugin
 from ..errors import InputError
 from ..filaments.filament import Filament
+from ..filaments.twist import has_twist
 from ..mechanics.geometry import to_nearest_images
 from ..units.quantities import require_kind, thermal_energy
 from ..units.types import FloatArray, IntArray
@@ -174,6 +175,16 @@ def _add_hand(force, hand, filaments, name):
     force.setHandSiteSpacing(number, hand.site_spacing or 0.0)
     force.setHandSevering(number, hand.severing_rate)
     force.setHandSliding(number, hand.sliding_friction or 0.0)
+    if hand.helix is not None:
+        for i in every:
+            if not has_twist(filaments[i].type):
+                raise InputError(
+                    f"Linkers {name!r}: a hand follows a helix, but binds to filament {i} "
+                    f"({filaments[i].type.name}), which has no twist: give its type a twist_persistence_length, or "
+                    "name others in binds_to."
+                )
+        own = hand.helix
+        force.setHandOnHelix(number, own.pitch, own.rotational_friction, own.stall_torque or 0.0, own.torque_range)
     if hand.binding_range is not None:
         own = hand.binding_range
         force.setHandBindingRange(number, ENDS_OF_RANGE.index(own.end), own.range, own.excluded)

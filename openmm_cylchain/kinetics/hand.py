@@ -24,6 +24,7 @@ from ..units.quantities import (
 from ..units.types import Scalar
 from .binding_range import BindingRange
 from .hand_at_end import HandAtEnd
+from .hand_on_helix import HandOnHelix
 
 AT_ENDS = ("release", "hold")
 """What a hand may do at the end of a filament to which it has walked or slid."""
@@ -88,6 +89,9 @@ class Hand:
     severing_rate : 1/time
         At which it cuts the filament to which it is bound, which must grow, before the nearest monomer: katanin,
         gelsolin, a clump of cofilin. New ends are as ``Growth.severing`` says; the hand stays where it was.
+    helix : HandOnHelix, optional
+        How it follows the helix of filaments with twist, to which alone it binds then: a polymerase. Such a hand has no
+        sites, and does not slide.
 
     Raises
     ------
@@ -112,6 +116,7 @@ class Hand:
     severing_rate: float = 0.0
     binding_range: BindingRange | None = None
     sliding_friction: float | None = None
+    helix: HandOnHelix | None = None
 
     if TYPE_CHECKING:  # What may be given; the attributes hold plain numbers.
 
@@ -135,6 +140,7 @@ class Hand:
             severing_rate: Scalar = 0.0,
             binding_range: BindingRange | None = None,
             sliding_friction: Scalar | None = None,
+            helix: HandOnHelix | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -167,6 +173,10 @@ class Hand:
             for name in ("speed", "site_spacing", "binding_range"):
                 if getattr(self, name):
                     raise InputError(f"Hand: give sliding_friction or {name}, not both.")
+        if self.helix is not None:
+            require_kind(self.helix, HandOnHelix, "Hand: helix")
+            if self.site_spacing is not None or self.sliding_friction is not None:
+                raise InputError("Hand: one that follows a helix has no site_spacing, and no sliding_friction.")
         if self.at_end is not None:
             one_of(self.at_end, AT_ENDS, "Hand: at_end")
         if self.binding_range is not None:

@@ -20,6 +20,7 @@ class RunFiles:
         self.linker_places = self.path / "linkers.npy"
         self.pulling = self.path / "pulling.csv"
         self.twist = self.path / "twist.csv"
+        self.twists = self.path / "twists.npy"
         self.crosslinks = self.path / "crosslinks.npy"
         self.growth = self.path / "growth.csv"
         self.wall_forces = self.path / "wall_forces.csv"

@@ -1,14 +1,18 @@
-"""What a line of ``twist.csv`` says."""
+"""What a line of ``twist.csv`` says, and the twists of all joints in a file that grows."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import cast
+from pathlib import Path
+from typing import Any, cast
 
+import numpy as np
 import openmm
 
 from ..filaments.collection import FilamentCollection
 from ..filaments.filament_type import FilamentType
+from ..filaments.twist import has_twist
+from .record_file import RecordFile
 
 
 def rows_of_twist(
@@ -22,3 +26,31 @@ def rows_of_twist(
         twists = filaments.in_context(context).twists(number)._value
         kind = cast(FilamentType, filaments[number].type)
         yield number, float(twists.sum()), float(kind.twist_stiffness * (twists[1:-1] - kind.rest_twist).mean())
+
+
+class TwistFile(RecordFile):
+    """A RecordFile with a record at each report: its step, and the twists in radians of all filaments that have any."""
+
+    def __init__(self, path: Path, filaments: FilamentCollection, count: int | None = None) -> None:
+        self._filaments = filaments
+        self._numbers = [number for number, own in enumerate(filaments) if has_twist(own.type)]
+        joints = sum(len(filaments.node_indices[number]) for number in self._numbers)
+        super().__init__(path, twist_record(joints), "twists", count)
+
+    def measure(self, context: openmm.Context, step: int) -> None:
+        """Write the record of a Context."""
+        here = self._filaments.in_context(context)
+        record = np.zeros(1, dtype=self._dtype)
+        record["step"] = step
+        record["twists"] = np.concatenate([self._twists_of(here, number) for number in self._numbers])
+        self.write(record)
+
+    def _twists_of(self, here, number):
+        # A filament that has gone has none.
+        there = self._filaments[number].takes_part
+        return here.twists(number)._value if there else np.zeros(len(self._filaments.node_indices[number]))
+
+
+def twist_record(joints: int) -> np.dtype[Any]:
+    """Of so many joints, those to the frames of ends among them."""
+    return np.dtype([("step", "<i8"), ("twists", "<f8", (joints,))])

@@ -26,6 +26,8 @@ COLORINGS = ("type", "tension", "orientation", "bending")
 _LINE_COLOR, _LINE_WIDTH = np.array([0.62, 0.64, 0.68]), 0.0011
 _VISIBLE = 0.009  # Of the extent of the scene: what a tube is wide at least.
 _VISIBLE_BALL = 0.012
+# A line along a filament that turns with its material: its radius, and how far out it is, over the filament's radius.
+_STRIPE, _STRIPE_OUT, _STRIPE_COLOR = 0.6, 0.7, np.array([0.08, 0.08, 0.1])
 _PLUS_END = 0.75  # Of the diameter of a filament: the radius of the ball at its last node.
 
 
@@ -111,7 +113,7 @@ class Scene:
         """Everything in a frame."""
         parts = list(self._fixed)
         values = None if self.scale is None else _values(self.run, self.look, self._director, frame)
-        colors = filament_colors(self.run)
+        colors, frames = filament_colors(self.run), self.run.material_frames(frame)
         for number, (own, points) in enumerate(zip(self.run.filaments, self.run.curves(frame))):
             if not len(points):
                 continue
@@ -123,7 +125,11 @@ class Scene:
                 plus, _ = self._wrapped(np.repeat(points[-1:, None], 2, axis=1).astype(float))
                 parts.append(Tubes.of_one_kind(plus, _PLUS_END * self.diameters[number], _rgb(PLUS_END_COLOR)))
             ends, which = self._wrapped(ends)
-            parts.append(Tubes.of_one_kind(ends, 0.5 * self.diameters[number], color[which]))
+            radius = 0.5 * self.diameters[number]
+            parts.append(Tubes.of_one_kind(ends, radius, color[which]))
+            if len(frames[number]):
+                stripe, _ = self._wrapped(_stripe(points, own.ring, frames[number], _STRIPE_OUT * radius))
+                parts.append(Tubes.of_one_kind(stripe, _STRIPE * radius, _STRIPE_COLOR))
         if self.look.linkers:
             parts += self._linkers(frame)
         return Tubes.joined(parts + self._balls(frame))
@@ -152,6 +158,20 @@ class Scene:
         if self.run.box is None or self.look.whole or not len(ends):
             return ends, np.arange(len(ends))
         return cut_at_faces(ends, self.run.box)
+
+
+def _stripe(points, ring, across, distance):
+    # Pieces between nodes and middles of segments of a line along a filament that turns with its material.
+    vectors = np.roll(points, -1, axis=0) - points if ring else np.diff(points, axis=0)
+    middles = points[: len(vectors)] + 0.5 * vectors + distance * across
+    before = np.roll(across, 1, axis=0)
+    if not ring:
+        before, across = np.vstack([across[:1], before[1:], across[-1:]]), np.vstack([across, across[-1:]])
+    at_nodes = before + across
+    at_nodes /= np.maximum(np.linalg.norm(at_nodes, axis=1, keepdims=True), 1e-9)
+    places = points + distance * at_nodes
+    behind = np.roll(places, -1, axis=0) if ring else places[1:]
+    return np.concatenate([np.stack([places[: len(middles)], middles], axis=1), np.stack([middles, behind], axis=1)])
 
 
 def has_polarity(run: Run) -> bool:

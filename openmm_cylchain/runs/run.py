@@ -13,12 +13,13 @@ from ..couplings.force_tables import ForceTables
 from ..couplings.mean_forces import contact_forces, wall_forces
 from ..engines.description import describe_lengths, filament_label
 from ..errors import InputError, InstabilityError
+from ..filaments.twist import has_twist
 from ..mechanics.broken_segment import find_broken_segment
 from ..output.growth_reporter import rows_of_growth
 from ..output.linker_records import LinkerFile, measure_linkers
 from ..output.progress import RunProgress
 from ..output.run_tables import ReportTable, TrajectoryFile
-from ..output.twist_rows import rows_of_twist
+from ..output.twist_rows import TwistFile, rows_of_twist
 from ..systems.described_runs import (
     energies_of_growing,
     energy_cells,
@@ -62,9 +63,10 @@ def run(configuration, output, resume=False):
     ``topology.cif``, the same for VMD (``topology.psf``) and OVITO (``topology.data``), ``trajectory.dcd`` (the initial
     configuration and one frame per report interval), ``energies.csv`` and ``checkpoint.chk``; with linkers also
     ``linkers.csv`` (how many are bound, their tensions) and ``linkers.npy`` (where each one is, see
-    ``LinkerReporter``); with filaments that grow ``growth.csv``; with walls ``wall_forces.csv``, and with contacts
-    ``contact_forces.csv``: forces of each face, and on each filament, means over the steps since the report before. A
-    resumed run ends with the same files, to the bit, as one that was never interrupted.
+    ``LinkerReporter``); with twist ``twists.npy``; with filaments that grow ``growth.csv``; with walls
+    ``wall_forces.csv``, and with contacts ``contact_forces.csv``: forces of each face, and on each filament, means over
+    the steps since the report before. A resumed run ends with the same files, to the bit, as one that was never
+    interrupted.
 
     Parameters
     ----------
@@ -256,6 +258,7 @@ class Recorder:
         self._step = 0 if checkpoint is None else checkpoint.step
         self._moving = MovingTethers(stage, filaments)
         self._framed = sorted({frame.filament for frame in filaments.end_frames})
+        self._twisted = any(has_twist(own.type) for own in filaments)
         self._absent = [number for number, own in enumerate(filaments) if not own.takes_part]
         self._grows = any(filament.growth is not None for filament in filaments)
         self._rows = RowsOfForces(self._stages, configuration)
@@ -291,6 +294,9 @@ class Recorder:
         if self._framed:
             self._twist = ReportTable(self._directory.twist, begun and begun.twist_size)
             files.append(self._twist)
+        if self._twisted:
+            self._twists = TwistFile(self._directory.twists, self._filaments, begun and begun.twist_records)
+            files.append(self._twists)
         if self._grows:
             self._growth = ReportTable(self._directory.growth, begun and begun.growth_size)
             files.append(self._growth)
@@ -404,6 +410,8 @@ class Recorder:
             self._pulling.write(self._step, row)
         for row in rows_of_twist(self._filaments, context, self._framed):
             self._twist.write(self._step, (self._stage.time(self._step), *row))
+        if self._twisted:
+            self._twists.measure(context, self._step)
 
     def _without_absent(self, positions):
         # Of a filament that is not there, all particles are in one place: that of a node that stands still.
@@ -459,6 +467,7 @@ class Recorder:
             linker_records=self._places.synchronise() if self._filaments.linkers else 0,
             pulling_size=self._pulling.synchronise() if self._moving else 0,
             twist_size=self._twist.synchronise() if self._framed else 0,
+            twist_records=self._twists.synchronise() if self._twisted else 0,
             force_sizes=self._forces.synchronise(),
             growth_size=self._growth.synchronise() if self._grows else 0,
             deleted=self._deleted,

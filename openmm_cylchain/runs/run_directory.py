@@ -32,6 +32,7 @@ class Checkpoint:
     linker_records: int = 0
     pulling_size: int = 0
     twist_size: int = 0
+    twist_records: int = 0
     force_sizes: tuple[int, int] = (0, 0)
     growth_size: int = 0
     deleted: frozenset[int] = frozenset()
@@ -110,6 +111,7 @@ class RunDirectory(RunFiles):
             self.crosslinks,
             self.pulling,
             self.twist,
+            self.twists,
             self.growth,
             self.wall_forces,
             self.contact_forces,
@@ -150,6 +152,7 @@ class RunDirectory(RunFiles):
             "linker_records": checkpoint.linker_records,
             "pulling_size": checkpoint.pulling_size,
             "twist_size": checkpoint.twist_size,
+            "twist_records": checkpoint.twist_records,
             "force_sizes": checkpoint.force_sizes,
             "growth_size": checkpoint.growth_size,
             "deleted": sorted(checkpoint.deleted),
@@ -183,6 +186,7 @@ class RunDirectory(RunFiles):
                 linker_records=header["linker_records"],
                 pulling_size=header["pulling_size"],
                 twist_size=header["twist_size"],
+                twist_records=header["twist_records"],
                 force_sizes=tuple(header["force_sizes"]),
                 growth_size=header["growth_size"],
                 deleted=frozenset(header["deleted"]),

@@ -15,6 +15,7 @@ from ..couplings.mean_forces import ForceReaders
 from ..couplings.periodicity import is_periodic
 from ..couplings.shapes import Shape
 from ..errors import InputError
+from ..filaments.twist import has_twist
 from ..output.files import as_path
 from ..output.growth_reporter import rows_of_growth
 from ..output.linker_records import LinkerFile, measure_linkers
@@ -26,6 +27,7 @@ from ..output.run_tables import (
     size_of_lines,
     start_of_trajectory,
 )
+from ..output.twist_rows import TwistFile
 from ..units.quantities import (
     LARGEST_INT,
     LENGTH,
@@ -198,6 +200,12 @@ class RunReporter:
                 if self._append:
                     count = int(np.searchsorted(read_records(files.linker_places)["step"], step, "right"))
                 self._places = opened(LinkerFile(files.linker_places, count))
+            self._twists = None
+            if any(has_twist(own.type) for own in filaments):
+                count = (
+                    int(np.searchsorted(read_records(files.twists)["step"], step, "right")) if self._append else None
+                )
+                self._twists = opened(TwistFile(files.twists, filaments, count))
             if growth_in(simulation.context, filaments) is not None:
                 self._growth = opened(table(files.growth))
             self._readers = ForceReaders(simulation.context)
@@ -239,6 +247,8 @@ class RunReporter:
             for number, row in enumerate(rows):
                 self._linkers.write(step, (time, number, *row))
             self._places.write(records)
+        if self._twists is not None:
+            self._twists.measure(simulation.context, step)
         for line in rows_of_growth(growth):
             self._growth.write(step, (time, *line))
         walls, contacts = self._readers.wall_forces(), self._readers.contact_forces()

@@ -92,6 +92,8 @@ struct StepSettings {
      */
     std::vector<std::vector<double> >* twists = NULL;
     std::vector<std::vector<double> >* twistChanges = NULL;
+    /** What hands do to the turns of each of these chains, each pair of segments once; NULL if none does. */
+    const std::vector<std::vector<TurnedPair> >* turnedPairs = NULL;
     /** Whether chains whose implicit step fails take it in parts; otherwise it has failed. */
     bool mayDivide = true;
 };

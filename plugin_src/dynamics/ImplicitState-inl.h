@@ -36,6 +36,8 @@ template <class Real> struct ImplicitSegment : IteratedSegment<Real> {
 template <class Real> struct TwistedJoint {
     // The torque is implicit times the change of the twist, and constant; what of that change an end frame makes.
     Real implicit, constant, turnedByEnd;
+    // What joins the turns of both segments: implicit, less the friction of hands against both.
+    Real coupling;
     // Of the segment: its friction over the step, the random torque, and what the elimination leaves.
     Real friction, random, inversePivot, border;
     // What this joint has of all torques when each twist changes by as much.

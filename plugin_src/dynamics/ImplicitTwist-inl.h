@@ -11,7 +11,7 @@
  * with the twist q_s of a joint at the start, and the area swept_s that the great circle between its tangents sweeps on
  * the unit sphere, by which the angle between frames that are carried along changes. That is done in each iteration,
  * and the torques T_s that come out are forces -T_s J_s(m) on nodes. What a change of the nodes does to T is in the
- * equations as far as all torques of a chain change together.
+ * equations as far as all torques of a chain change together. Hands that follow the helix add to Z and to random.
  */
 
 /** Whether there are packs with twist: in double precision alone. */
@@ -75,7 +75,7 @@ public:
             joint.friction = friction*(1/step.h);
             friction = lesser<Real>(friction, loaded<Real>(twist.friction, before(s)));
             const Real theta = larger<Real>(splat<Real>(0.5), 1-friction/(4*step.h*stiffness+TINY));
-            joint.implicit = stiffness*theta;
+            joint.implicit = joint.coupling = stiffness*theta;
             joint.constant = stiffness*step.start.twists[s]+loaded<Real>(twist.torque, s);
             joint.turnedByEnd = loaded<Real>(twist.angularVelocity, s)*step.h;
             joint.random = Real{};
@@ -84,6 +84,8 @@ public:
         }
         if (step.settings.kT > 0)
             draw();
+        if (step.settings.turnedPairs != NULL)
+            addTurnedPairs();
         factorise();
     }
     /** Set the forces of twist, for new nodes, and add them to the loads of these. */
@@ -188,6 +190,32 @@ private:
             joint.random = normals[1]*root(2*step.kT*joint.friction);
         }
     }
+    void addTurnedPairs() {
+        const double kT = step.settings.kT, perTime = 1/step.h;
+        for (int i = 0; i < W; i++) {
+            if (pack.chain[i] < 0)
+                continue;
+            for (const TurnedPair& pair : (*step.settings.turnedPairs)[pack.chain[i]]) {
+                const int s = pair.segment, next = s+1 < segments ? s+1 : 0;
+                TwistedJoint<Real> &own = joints[s], &other = joints[next];
+                // Of the numbers that belong to this place, twist takes the first two.
+                Scalar normals[4] = {};
+                if (kT > 0)
+                    drawNormals<1, 2>(noiseKey(step.settings), NoiseKind::Node, {(Word) pack.chain[i], (Word) s},
+                            normals);
+                const double root = std::sqrt(pair.first), mixed = root > 0 ? pair.mixed/root : 0;
+                const double rest = std::sqrt(std::fmax(0.0, pair.second-mixed*mixed));
+                const double noise = std::sqrt(2*kT*perTime);
+                lane(own.friction, i) += pair.first*perTime;
+                lane(own.random, i) += pair.torque[0]+noise*root*normals[2];
+                if (pair.second == 0)
+                    continue;
+                lane(other.friction, i) += pair.second*perTime;
+                lane(other.random, i) += pair.torque[1]+noise*(mixed*normals[2]+rest*normals[3]);
+                lane(joints[s+1].coupling, i) -= pair.mixed*perTime;
+            }
+        }
+    }
     /** Eliminate the turns of segments, and find how torques respond to a change of all twists. */
     void factorise() {
         for (int s = 0; s < segments; s++) {
@@ -195,16 +223,16 @@ private:
             if (CLOSED && s == 0)
                 pivot = pivot+pivot;
             if (CLOSED && s == segments-1) {
-                const Real last = joints[segments].implicit;
+                const Real last = joints[segments].coupling;
                 pivot = pivot+last*last*(2*joints[0].inversePivot);
             }
             if (s > 0)
-                pivot = pivot-joints[s].implicit*joints[s].implicit*joints[s-1].inversePivot;
+                pivot = pivot-joints[s].coupling*joints[s].coupling*joints[s-1].inversePivot;
             joints[s].inversePivot = 1/pivot;
         }
         if (CLOSED) {
             // By Sherman and Morrison, for the coupling of the last segment and the first.
-            const Real last = joints[segments].implicit, diagonal = 0.5/joints[0].inversePivot;
+            const Real last = joints[segments].coupling, diagonal = 0.5/joints[0].inversePivot;
             corner = last/diagonal;
             for (int s = 0; s < segments; s++)
                 joints[s].turn = s == 0 ? -diagonal : Real{};
@@ -239,11 +267,11 @@ private:
     /** Solve the equations of open chains for turns, in which the right sides are. */
     void substitute() {
         for (int s = 1; s < segments; s++)
-            joints[s].turn = joints[s].turn+joints[s].implicit*joints[s-1].inversePivot*joints[s-1].turn;
+            joints[s].turn = joints[s].turn+joints[s].coupling*joints[s-1].inversePivot*joints[s-1].turn;
         for (int s = segments-1; s >= 0; s--) {
             Real right = joints[s].turn;
             if (s < segments-1)
-                right = right+joints[s+1].implicit*joints[s+1].turn;
+                right = right+joints[s+1].coupling*joints[s+1].turn;
             joints[s].turn = right*joints[s].inversePivot;
         }
     }

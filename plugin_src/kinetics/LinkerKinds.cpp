@@ -44,6 +44,7 @@ void LinkerKinetics::findKinds(const KineticStep& step) {
                 kind.slides = kind.slides || hand.slidingFriction > 0;
                 kind.walks = kind.walks || kind.slides || (hand.speed != 0 && !hops);
                 kind.velocity = hops ? 0 : hand.speed;
+                kind.isStoppedByTorque = kind.isStoppedByTorque || hand.helix.stallTorque > 0;
                 // A barrier may hold it.
                 const bool mayBeHeld = hand.speed != 0 && !system.barriers.empty();
                 known = known && !mayBeHeld && !dependsOnPlace &&

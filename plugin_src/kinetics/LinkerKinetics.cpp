@@ -174,7 +174,7 @@ bool LinkerKinetics::draw(LinkerState& state, const KineticStep& step, Pending& 
                 const int direction = hand.speed > 0 ? 1 : -1;
                 double stiffness;
                 const double along = pulls ? direction*pull(linker, side, spring, step, stiffness) : 0;
-                const double speed = speedUnder(hand, along);
+                const double speed = speedUnder(hand, 1, along);
                 add(Event::Hop, side, speed > 0 ? direction : -direction, fabs(speed)/hand.siteSpacing);
             }
         }
@@ -351,7 +351,7 @@ bool LinkerKinetics::looksAtPiece(const Watch& watch) const {
 void LinkerKinetics::walkAll(Linker& linker, const KineticStep& step, Watch& own, RandomNumbers& random,
         Count& count) const {
     const Kind& kind = kinds[own.kind];
-    if (kind.pulls || !system.barriers.empty())
+    if (kind.pulls || kind.isStoppedByTorque || !system.barriers.empty())
         walk(linker, step, random, count);
     else {
         const int side = own.kind%4-1;

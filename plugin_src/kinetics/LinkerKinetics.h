@@ -26,6 +26,8 @@ struct KineticStep {
     std::uint32_t seed;
     /** The number of the Force, to which random numbers belong. */
     std::uint32_t force;
+    /** Of hands that a torque stops. */
+    TorqueOnHand torqueOnHand = nullptr;
 };
 
 /**
@@ -147,7 +149,7 @@ private:
         unsigned most = 0;
         bool isFree = false, isPlanar = false;
         /** Whether hands move that are bound to no sites, and whether any of them slides. */
-        bool walks = false, slides = false;
+        bool walks = false, slides = false, isStoppedByTorque = false;
         bool atAnchor = false, sameChain = false, needsSites = false, pulls = false;
         /** Whether a step has nothing to do for it as long as its clock does not run out. */
         bool rests = false;
@@ -173,7 +175,8 @@ private:
     static int findTrackedEnd(const Hand& hand, const HandPlace& place, const Contours& contours);
     double captureRate(const LinkerType& type, int side, const KineticStep& step) const;
     double pull(const Linker& linker, int side, const Spring& spring, const KineticStep& step, double& stiffness) const;
-    double speedUnder(const Hand& hand, double pull) const;
+    double speedUnder(const Hand& hand, double drive, double pull) const;
+    double driveOf(const Hand& hand, const HandPlace& place, const KineticStep& step) const;
     void slide(Linker& linker, const KineticStep& step, RandomNumbers& random, Count& count) const;
     void slideHand(Linker& linker, int side, const KineticStep& step, double duration, bool isShort,
             RandomNumbers& random, Count& count) const;

@@ -121,10 +121,19 @@ double LinkerKinetics::pull(const Linker& linker, int side, const Spring& spring
     return side == 0 ? pull : -pull;
 }
 
+/** What the torque of the chain leaves of the speed of a hand without load: one if there is none. */
+double LinkerKinetics::driveOf(const Hand& hand, const HandPlace& place, const KineticStep& step) const {
+    if (!(hand.helix.stallTorque > 0) || !step.torqueOnHand)
+        return 1;
+    // As a hand walks, it turns the chain behind it on, and the other way if either is reversed.
+    const double sign = (hand.speed > 0) == (hand.helix.pitch > 0) ? 1 : -1;
+    return 1-sign*step.torqueOnHand(hand, place)/hand.helix.stallTorque;
+}
+
 /** The speed under a pull in the direction of walking, which is that of the unloaded speed if positive. */
-double LinkerKinetics::speedUnder(const Hand& hand, double pull) const {
+double LinkerKinetics::speedUnder(const Hand& hand, double drive, double pull) const {
     const double size = fabs(hand.speed);
-    const double ratio = hand.stallForce > 0 ? 1+pull/hand.stallForce : 1;
+    const double ratio = hand.stallForce > 0 ? drive+pull/hand.stallForce : drive;
     return size*min(2.0, max(hand.walksBackward ? -1.0 : 0.0, ratio));
 }
 
@@ -175,10 +184,11 @@ void LinkerKinetics::walkPart(Linker& linker, const KineticStep& step, double du
         const double direction = hand.speed > 0 ? 1 : -1;
         double stiffness = 0;
         const double along = pulls ? direction*pull(linker, side, spring, step, stiffness) : 0;
-        double move = speedUnder(hand, along)*duration;
+        const double drive = driveOf(hand, linker.hands[side], step);
+        double move = speedUnder(hand, drive, along)*duration;
         // However long it is, it ends where the spring stops it.
         if (pulls && hand.stallForce > 0 && stiffness > 0) {
-            const double toStall = (along+hand.stallForce)/(stiffness*walking);
+            const double toStall = (along+hand.stallForce*drive)/(stiffness*walking);
             move = move > 0 ? min(move, max(0.0, toStall)) : max(move, min(0.0, toStall));
         }
         moves[side] = direction*move;

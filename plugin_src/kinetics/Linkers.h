@@ -2,10 +2,12 @@
 #define CYLCHAIN_LINKERS_H_
 
 #include "couplings/Place.h"
+#include "couplings/TwistedContour.h"
 #include "couplings/Walls.h"
 #include "mechanics/ChainList.h"
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <vector>
 
@@ -83,6 +85,7 @@ struct Hand {
     double severingRate = 0;
     BindingRange bindingRange;
     HandAtEnd atEnd;
+    HandOnHelix helix;
     /** Whether the rate of unbinding depends on what the spring does. */
     bool isLoaded() const {
         return strainShare > 0 || unbindingForce > 0 || (catchRate > 0 && catchForce > 0);
@@ -178,6 +181,9 @@ struct HandPlace {
         return chain >= 0;
     }
 };
+
+/** The torque of its chain on a hand, about the direction towards the plus end. */
+typedef std::function<double(const Hand& hand, const HandPlace& place)> TorqueOnHand;
 
 /** Let a place be on the part of a chain that was cut to which it belongs, or on none if that has vanished. */
 template <class AlongChain> void followCut(const ChainCut& cut, AlongChain& place) {

@@ -34,6 +34,17 @@ struct ChainTwist {
     }
 };
 
+/**
+ * What hands that follow the helix of a chain do to the turns of a segment and the one behind it: they are turned about
+ * the chain by weighted means of both, against a friction.
+ */
+struct TurnedPair {
+    int segment;
+    /** The friction as a symmetric matrix, and the torques by which hands that walk turn the segments. */
+    double first = 0, mixed = 0, second = 0;
+    double torque[2] = {0, 0};
+};
+
 } // namespace cylchain
 
 #endif /*CYLCHAIN_CHAIN_TWIST_H_*/

@@ -243,7 +243,7 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         double& bendingRigidity, double& shortening, double& rate, double& angle,
         double& distance, double& beyond, double& range, double& friction, double& diffusion, double& leastCosine,
         double& largestCosine, double& position, double& captureProbability, double& releaseRate,
-        double& torque, double& angularVelocity, double& offRate};
+        double& torque, double& angularVelocity, double& offRate, double& pitch, double& stallTorque};
 %apply bool& OUTPUT {bool& walksBackward, bool& holdsAtEnds, bool& sameChain, bool& vanishes, bool& isRegular,
         bool& bindsThere, bool& tracks, bool& planar, bool& excluded, bool& transActivated, bool& reversible};
 %apply long long& OUTPUT {long long& bindings, long long& unbindings};

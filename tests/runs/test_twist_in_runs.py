@@ -1,10 +1,13 @@
 """Filaments with twist in files of runs: their types, frames at their ends, `twist.csv`, stages, and resuming."""
 
+import gsd.hoomd
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from openmm_cylchain import DSDNA, analysis
 from openmm_cylchain.cli import main
+from openmm_cylchain.rendering.scene import Look, make_scene
 from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.created_simulation import create_simulation
 from openmm_cylchain.runs.keys import ConfigurationError
@@ -38,10 +41,58 @@ def test_twist_and_torque_at_each_report(wound):
     assert torque[10:].mean() == pytest.approx(2 * np.pi * rigidity * turns[10:].mean() / 100.0, rel=0.1)
 
 
+def test_twists_of_all_joints_and_frames_of_segments(wound):
+    run = analysis.load(wound)
+    for frame in (0, 17, -1):
+        twists, vectors = run.twists(frame), run.material_frames(frame)
+        turns = [own.sum() / (2 * np.pi) for own in twists]
+        np.testing.assert_allclose(turns, run.twist["twist (turns)"][frame], rtol=1e-10, atol=1e-12)
+        for own, across, nodes in zip(twists, vectors, run.nodes(frame)):
+            tangents = np.diff(nodes, axis=0)
+            tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+            assert own.shape == (21,) and across.shape == (20, 3)
+            np.testing.assert_allclose(np.einsum("ij,ij->i", across, tangents), 0.0, atol=1e-12)
+            np.testing.assert_allclose(np.linalg.norm(across, axis=1), 1.0)
+            # Turned back by its twist, each vector is carried to the one before by the rotation about their binormal.
+            for s in range(1, 20):
+                turn = Rotation.from_rotvec(-own[s] * tangents[s])
+                axis = np.cross(tangents[s], tangents[s - 1])
+                size = np.linalg.norm(axis)
+                back = Rotation.from_rotvec(np.arctan2(size, tangents[s] @ tangents[s - 1]) * axis / max(size, 1e-30))
+                np.testing.assert_allclose(back.apply(turn.apply(across[s])), across[s - 1], atol=1e-9)
+
+
+def test_exports_and_pictures_show_frames(wound, tmp_path):
+    assert main(["export", str(wound), "--format", "ovito", "--output", str(tmp_path / "run.gsd")]) == 0
+    run = analysis.load(wound)
+    with gsd.hoomd.open(str(tmp_path / "run.gsd")) as file:
+        orientation = file[-1].particles.orientation
+    turns = Rotation.from_quat(orientation[:, [1, 2, 3, 0]])
+    for number, (across, nodes) in enumerate(zip(run.material_frames(-1), run.nodes(-1))):
+        own = turns[21 * number : 21 * (number + 1)]
+        along = np.diff(nodes, axis=0)
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        np.testing.assert_allclose(own.apply([1, 0, 0])[:20], across, atol=1e-6)
+        np.testing.assert_allclose(own.apply([0, 0, 1]), np.vstack([along, along[-1:]]), atol=1e-6)
+    tubes = make_scene(run, Look(), [0]).tubes(-1)
+    stripes = np.flatnonzero((tubes.colors < 0.2).all(axis=1))
+    assert len(stripes) == 2 * 2 * 20 and len(tubes.colors) == 3 * 2 * 20
+    radii = tubes.radii[stripes] / 0.6
+    middles = run.nodes(-1)[0][:-1] + 0.5 * np.diff(run.nodes(-1)[0], axis=0)
+    out = tubes.ends[stripes[:20], 1] - middles
+    np.testing.assert_allclose(np.linalg.norm(out, axis=1), 0.7 * radii[0], rtol=1e-6)
+    # Half a turn from one end to the other.
+    assert run.material_frames(-1)[0][0] @ run.material_frames(-1)[0][-1] < -0.5
+
+
 def test_intrinsic_twist(wound, tmp_path):
     """It is among the turns, and the torque is that without it."""
     text = WOUND.replace('"100 nm"', '"100 nm"\nintrinsic_twist = "-34.3 deg/angstrom"')
     assert main(_run(text, tmp_path)) == 0
+    for own, expected in zip(
+        analysis.load(tmp_path / "out").material_frames(3), analysis.load(wound).material_frames(3)
+    ):
+        np.testing.assert_allclose(own, expected, atol=1e-3)
     run, plain = analysis.load(tmp_path / "out").twist, analysis.load(wound).twist
     difference = run["twist (turns)"] - plain["twist (turns)"]
     np.testing.assert_allclose(difference, np.full((41, 2), -343 / 360 * 19 * 5), rtol=1e-6)
@@ -50,8 +101,47 @@ def test_intrinsic_twist(wound, tmp_path):
 
 def test_a_resumed_run_is_the_same(wound, tmp_path, monkeypatch):
     stop_and_resume(_run(WOUND, tmp_path), monkeypatch, checkpoints=3)
-    for name in ("twist.csv", "energies.csv", "trajectory.dcd"):
+    for name in ("twist.csv", "twists.npy", "energies.csv", "trajectory.dcd"):
         assert (tmp_path / "out" / name).read_bytes() == (wound / name).read_bytes()
+
+
+POLYMERASE = """
+[[linkers]]
+name = "polymerase"
+count = 2
+volume = "1 um^3"
+stiffness = "1 pN/nm"
+bound_at = [{ filament = [0, 1], arc_length = "40 nm" }]
+[[linkers.hands]]
+binding_rate = "0 1/s"
+reach = "10 nm"
+unbinding_rate = "0 1/s"
+speed = "5 um/ms"
+helix = { pitch = "3.57 nm", rotational_friction = "1 pN*nm*s", stall_torque = "11 pN*nm" }
+[[linkers.hands]]
+binding_rate = "0 1/s"
+reach = "10 nm"
+unbinding_rate = "0 1/s"
+[[stage]]
+"""
+
+
+def test_hands_that_follow_the_helix(tmp_path, monkeypatch):
+    text = WOUND.replace("[[stage]]", POLYMERASE, 1)
+    kind = parse_configuration(text).linkers[0].kind
+    assert kind.hands[0].helix.stall_torque == pytest.approx(11.0 * 0.602214, rel=1e-5)
+    assert kind.hands[0].helix.torque_range == 100.0 and kind.hands[1].helix is None
+    (tmp_path / "whole").mkdir()
+    assert main(_run(text, tmp_path / "whole")) == 0
+    stop_and_resume(_run(text, tmp_path), monkeypatch, checkpoints=3)
+    for name in ("twist.csv", "twists.npy", "linkers.csv", "trajectory.dcd"):
+        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "whole" / "out" / name).read_bytes()
+    with pytest.raises(ConfigurationError, match="pitch"):
+        parse_configuration(text.replace('"3.57 nm"', '"0 nm"'))
+    with pytest.raises(ConfigurationError, match="no twist"):
+        own = text.replace('[[end_frame]]\ntable = 1\nend = "minus"\ndirection = [0, 0, 1]\n', "")
+        own = own[: own.index("[[end_frame]]")] + own[own.index("[[pull]]") : own.index("[stage.end_frame")]
+        create_simulation(parse_configuration(own.replace('twist_persistence_length = "100 nm"\n', "")))
 
 
 def test_a_torsional_rigidity_in_place_of_a_length():

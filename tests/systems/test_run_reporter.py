@@ -1,5 +1,6 @@
 """Runs from Python that are loaded, drawn and exported as those of ``openmm-cylchain run`` are."""
 
+import dataclasses
 import json
 import shutil
 
@@ -155,6 +156,36 @@ def test_it_goes_on_from_a_checkpoint(tmp_path):
     for frame in range(8):
         np.testing.assert_array_equal(one.crosslinks(frame).places, other.crosslinks(frame).places)
     assert [len(other.crosslinks(frame)) for frame in range(8)] == [1] * 6 + [2] * 2
+
+
+def test_twists_go_on_from_a_checkpoint(tmp_path):
+    """Of rings; a filament without twist has none."""
+    kind = dataclasses.replace(F_ACTIN, torsional_rigidity=F_ACTIN.bending_rigidity)
+    paths = [tmp_path / "straight", tmp_path / "stopped"]
+    for path in paths:
+        for begins in (True, False) if path == paths[1] else (True,):
+            filaments = Filaments(602.214, 300.0)
+            filaments.add_straight(F_ACTIN, 4, [0, 0, 0], [0, 0, 1])
+            filaments.add_ring(kind, 8, [5000, 0, 0])
+            topology, system, positions = filaments.build()
+            integrator = filaments.create_integrator(system, 1e6, random_seed=2)
+            simulation = app.Simulation(topology, system, integrator, Platform.getPlatform("Reference"))
+            simulation.context.setPositions(positions)
+            if begins:
+                filaments.in_context(simulation.context).set_twists(1, np.full(8, 0.1))
+            else:
+                simulation.loadCheckpoint(str(tmp_path / "twisted"))
+            simulation.reporters.append(RunReporter(path, 5, filaments, append=not begins))
+            simulation.step(13 if begins else 12)
+            if begins:
+                simulation.saveCheckpoint(str(tmp_path / "twisted"))
+                simulation.step(12)
+            simulation.reporters[0].close()
+    one, other = map(analysis.load, paths)
+    assert (paths[0] / "twists.npy").read_bytes() == (paths[1] / "twists.npy").read_bytes()
+    assert len(one) == len(other) == 6 and len(one.twists(-1)[0]) == 0
+    np.testing.assert_array_equal(one.twists(-1)[1], filaments.in_context(simulation.context).twists(1)._value)
+    assert [len(own) for own in other.material_frames(3)] == [0, 8]
 
 
 @pytest.mark.filterwarnings("ignore::openmm_cylchain.TimeStepWarning")

@@ -11,6 +11,7 @@ from ...kinetics.binding_range import ENDS_OF_RANGE, BindingRange
 from ...kinetics.crosslinker import Crosslinker
 from ...kinetics.hand import AT_ENDS, Hand
 from ...kinetics.hand_at_end import HandAtEnd
+from ...kinetics.hand_on_helix import HandOnHelix
 from ...kinetics.linkers import as_linkers, is_closed
 from ...kinetics.presets import PRESETS
 from ...units import quantities as units
@@ -115,6 +116,24 @@ _RANGE = TableKind(
     owner="binding_range of the hand of [[linkers]]",
 )
 
+_HELIX_EXAMPLE = '{ pitch = "3.57 nm", rotational_friction = "1 pN*nm*s", stall_torque = "11 pN*nm" }'
+_HELIX = TableKind(
+    "helix",
+    (
+        Key("pitch", Quantity(units.LENGTH, "any"), REQUIRED, "Length of a turn; left-handed if negative."),
+        Key(
+            "rotational_friction",
+            Quantity(units.ROTATIONAL_FRICTION, "zero"),
+            REQUIRED,
+            "Torque over angular velocity of the hand, with what is bound to it, about the filament.",
+        ),
+        Key("stall_torque", Quantity(units.ENERGY), None, "Torque of the filament at which the hand stands still."),
+        Key("torque_range", Quantity(units.LENGTH), None, "How far on either side it is from; 100 nm if not given."),
+    ),
+    "How a hand follows the helix of filaments with twist, see `HandOnHelix`.",
+    owner="helix of the hand of [[linkers]]",
+)
+
 KEPT = ("all", "bound", "both hands bound")
 """Linkers that a stage keeps, by how many of their hands are bound at least."""
 HAND = TableKind(
@@ -131,6 +150,7 @@ HAND = TableKind(
             None,
             "What it has to do with an end of filaments that grow: formins, caps, depolymerases.",
         ),
+        Key("helix", Inline(_HELIX, _HELIX_EXAMPLE), None, "How it follows the helix of filaments with twist."),
         Key("binding_range", Inline(_RANGE, _RANGE_EXAMPLE), None, "Near which end it binds; everywhere if not given."),
     ),
     "A hand, see `Hand`.",
@@ -432,6 +452,10 @@ def _hand(entries, changed):
         own = properties["binding_range"]
         with own.naming():
             properties["binding_range"] = BindingRange(**own.given(*_RANGE.names))
+    if "helix" in properties:
+        own = properties["helix"]
+        with own.naming():
+            properties["helix"] = HandOnHelix(**own.given(*_HELIX.names))
     if properties.get("speed") == 0.0:
         # One that stands still, as in a stage with a drug, keeps what it has for when it walks.
         properties.update(stall_force=None, walks_backward=False)

@@ -417,6 +417,25 @@ void CylinderChainBindingForce::getHandRemoval(int hand, double& offRate, int& s
     unbindingRate = own.unbindingRate;
 }
 
+void CylinderChainBindingForce::getHandOnHelix(int hand, double& pitch, double& friction, double& stallTorque,
+        double& range) const {
+    const cylchain::HandOnHelix& own = getHand(hand).helix;
+    pitch = own.pitch;
+    friction = own.friction;
+    stallTorque = own.stallTorque;
+    range = own.range;
+}
+
+void CylinderChainBindingForce::setHandOnHelix(int hand, double pitch, double friction, double stallTorque,
+        double range) {
+    requireOfBinding(isfinite(pitch), "The pitch of a helix must be finite");
+    requireNotNegative(friction, "friction against turning");
+    requireNotNegative(stallTorque, "stall torque");
+    requireNotNegative(range, "range of a torque");
+    requireOfBinding(pitch != 0 || stallTorque == 0, "A torque stops hands that follow a helix alone");
+    handOf(hand).helix = {pitch, friction, stallTorque, range};
+}
+
 double CylinderChainBindingForce::getHandSevering(int hand) const {
     return getHand(hand).severingRate;
 }

@@ -10,6 +10,7 @@
 #include "openmm/System.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/CylinderChainDescription.h"
+#include "openmm/internal/CylinderChainForceImpl.h"
 #include "openmm/internal/CylinderChainWallForceImpl.h"
 #include "openmm/internal/LinkDescription.h"
 #include "openmm/internal/LinkerDescription.h"
@@ -117,6 +118,7 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
             require(type >= 0 && type < owner.getNumLinkerTypes() && system.types[type].hands[0] >= 0 &&
                     system.types[type].concentration == 0, "The joint of branches "+to_string(i)+" needs linkers with "
                     "two hands that come from no concentration");
+    checkHelices(description.getList());
     system.barriers = owner.getBarriers();
     for (const cylchain::Barrier& barrier : system.barriers)
         require(barrier.chain < contours->getNumChains() && barrier.position <= contours->getLength(barrier.chain),
@@ -245,8 +247,13 @@ void CylinderChainBindingForceImpl::updateContextState(ContextImpl& context, boo
             "there are no more numbers for others. Give them new ones, from zero on: read them by "
             "getLinkersInContext(), and set them by setLinkersInContext()");
     const bool pulled = !getLinks().empty();
+    const vector<cylchain::Linker> before = anyOnHelix ? state.linkers : vector<cylchain::Linker>();
     const long long failed = linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().execute(context, state,
-            BOLTZ*getTemperature(), size, seed, number, links);
+            BOLTZ*getTemperature(), size, seed, number,
+            [this] (const cylchain::Hand& hand, const cylchain::HandPlace& place) {
+        return describeTwist(place.chain).findTorque(place.position, hand.helix.range);
+    }, links);
+    findTurnedPairs(before, size);
     accept();
     hasStepped = true;
     timeBefore = context.getTime();
@@ -262,6 +269,67 @@ void CylinderChainBindingForceImpl::updateContextState(ContextImpl& context, boo
     // An implicit step computes the forces itself.
     if (!wasExcluded && (pulled || !links.empty()))
         forcesInvalid = true;
+}
+
+void CylinderChainBindingForceImpl::checkHelices(const cylchain::ChainList& chains) {
+    anyOnHelix = false;
+    for (size_t i = 0; i < system.hands.size(); i++) {
+        const cylchain::Hand& hand = system.hands[i];
+        if (hand.helix.pitch == 0)
+            continue;
+        anyOnHelix = true;
+        require(hand.siteSpacing == 0 && hand.slidingFriction == 0, "Hand "+to_string(i)+
+                " follows a helix: it has no sites, and does not slide");
+        for (int chain : hand.chains)
+            require(chains.getKind(chain) == cylchain::ChainKind::StraightSegments &&
+                    chains.getChain(chain).twist.isPresent(), "Hand "+to_string(i)+" follows the helix of "+
+                    chains.getNameInSentence(chain)+", which has no twist");
+    }
+    for (ForceImpl* impl : context->getForceImpls())
+        if (anyOnHelix && dynamic_cast<CylinderChainForceImpl*>(impl) != NULL)
+            chainImpl = dynamic_cast<CylinderChainForceImpl*>(impl);
+}
+
+cylchain::TwistedContour CylinderChainBindingForceImpl::describeTwist(int chain) const {
+    const cylchain::ChainList& list = chainImpl->getDescription().getList();
+    return {*contours, chain, list.getChain(chain), chainImpl->getTwists()[list.getIndex(chain)]};
+}
+
+void CylinderChainBindingForceImpl::findTurnedPairs(const vector<cylchain::Linker>& before, double size) {
+    turnedPairs.clear();
+    if (!anyOnHelix)
+        return;
+    // Linkers are in the order of their numbers.
+    auto old = before.begin();
+    for (const cylchain::Linker& linker : state.linkers) {
+        while (old != before.end() && old->number < linker.number)
+            old++;
+        for (int side = 0; side < 2; side++) {
+            const cylchain::HandPlace& place = linker.hands[side];
+            if (!place.isBound())
+                continue;
+            const cylchain::Hand& hand = system.hands[system.types[linker.type].hands[side]];
+            if (hand.helix.pitch == 0)
+                continue;
+            double walked = 0;
+            if (old != before.end() && old->number == linker.number && old->hands[side].chain == place.chain) {
+                walked = place.position-old->hands[side].position;
+                if (contours->isClosed(place.chain))
+                    walked -= contours->getLength(place.chain)*round(walked/contours->getLength(place.chain));
+                // One that has come further has let go, and bound elsewhere.
+                if (fabs(walked) > 2.001*fabs(hand.speed)*size)
+                    walked = 0;
+            }
+            turnedPairs.push_back({place.chain, describeTwist(place.chain).describe(hand.helix, place.position, walked,
+                    size)});
+        }
+    }
+}
+
+bool CylinderChainBindingForceImpl::addTurnedPairs(vector<vector<cylchain::TurnedPair> >& pairs) const {
+    for (const auto& own : turnedPairs)
+        cylchain::addTurnedPair(pairs[chainImpl->getDescription().getList().getIndex(own.first)], own.second);
+    return !turnedPairs.empty();
 }
 
 const vector<cylchain::Link>& CylinderChainBindingForceImpl::getLinks() {

@@ -4,6 +4,7 @@
 #include "mechanics/PeriodicBox.h"
 #include "openmm/CylinderChainException.h"
 #include "openmm/CylinderChainKernels.h"
+#include "openmm/internal/CylinderChainBindingForceImpl.h"
 #include "openmm/reference/SimTKOpenMMRealType.h"
 #include <algorithm>
 #include <cmath>
@@ -135,8 +136,18 @@ StepSettings CylinderChainStepper::describeStep(uint64_t seed, int level, uint64
             throw OpenMMException("CylinderChainIntegrator: Twist is for scheme Implicit alone, with the force group "
                     "of the CylinderChainForce among the integration force groups");
         settings.twists = &force.getTwists();
+        describeTurnedPairs(settings);
     }
     return settings;
+}
+
+void CylinderChainStepper::describeTurnedPairs(StepSettings& settings) {
+    turnedPairs.assign(chains.getChains().size(), {});
+    for (const ForceImpl* impl : context.getForceImpls()) {
+        const auto* linkers = dynamic_cast<const CylinderChainBindingForceImpl*>(impl);
+        if (linkers != NULL && linkers->addTurnedPairs(turnedPairs))
+            settings.turnedPairs = &turnedPairs;
+    }
 }
 
 void CylinderChainStepper::refuseBeams(Scheme scheme, double kT) const {

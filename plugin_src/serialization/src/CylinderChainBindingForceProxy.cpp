@@ -21,7 +21,11 @@ static void write(const CylinderChainBindingForce& force, SerializationNode& nod
                 .setDoubleProperty("speed", hand.speed).setDoubleProperty("stallForce", hand.stallForce)
                 .setBoolProperty("walksBackward", hand.walksBackward)
                 .setBoolProperty("holdsAtEnds", hand.holdsAtEnds).setDoubleProperty("siteSpacing", hand.siteSpacing)
-                .setDoubleProperty("severingRate", hand.severingRate);
+                .setDoubleProperty("severingRate", hand.severingRate)
+                .setDoubleProperty("pitch", hand.helix.pitch)
+                .setDoubleProperty("turningFriction", hand.helix.friction)
+                .setDoubleProperty("stallTorque", hand.helix.stallTorque)
+                .setDoubleProperty("rangeOfTorque", hand.helix.range);
         const cylchain::HandAtEnd& atEnd = hand.atEnd;
         child.setIntProperty("end", atEnd.end).setDoubleProperty("endRange", atEnd.range)
                 .setBoolProperty("bindsAtEnd", atEnd.bindsThere).setBoolProperty("tracksEnd", atEnd.tracks)
@@ -112,6 +116,8 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
                 hand.getBoolProperty("rangeExcluded"));
         force->setHandSiteSpacing(number, hand.getDoubleProperty("siteSpacing"));
         force->setHandSevering(number, hand.getDoubleProperty("severingRate"));
+        force->setHandOnHelix(number, hand.getDoubleProperty("pitch"), hand.getDoubleProperty("turningFriction"),
+                hand.getDoubleProperty("stallTorque"), hand.getDoubleProperty("rangeOfTorque"));
     }
     for (auto& type : node.getChildNode("LinkerTypes").getChildren()) {
         const int number = force->addLinkerType(type.getIntProperty("hand1"), type.getIntProperty("hand2"),

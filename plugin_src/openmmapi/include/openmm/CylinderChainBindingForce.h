@@ -184,6 +184,20 @@ public:
      * @param friction  the friction, measured in kJ ps/mol/nm^2, or 0 if they do not slide
      */
     void setHandSliding(int hand, double friction);
+    /** Get how hands of a kind follow the helix of filaments, see setHandOnHelix(). */
+    void getHandOnHelix(int hand, double& pitch, double& friction, double& stallTorque, double& range) const;
+    /**
+     * Let hands of a kind follow the helix of filaments with twist: they turn about the filament with the material, and
+     * as they walk.
+     *
+     * @param hand         the index of the kind, which has neither sites nor friction of sliding
+     * @param pitch        the length of a turn of the helix at rest, negative if it is left-handed, measured in nm; or
+     *                     0 of hands that follow none
+     * @param friction     against turning about the filament, measured in kJ ps/mol
+     * @param stallTorque  the torque of the filament that stops it, measured in kJ/mol, or 0 if none changes its speed
+     * @param range        from how far on either side the torque is known, measured in nm
+     */
+    void setHandOnHelix(int hand, double pitch, double friction, double stallTorque, double range);
     /** Get the rate at which hands of a kind cut filaments, see setHandSevering(). */
     double getHandSevering(int hand) const;
     /**

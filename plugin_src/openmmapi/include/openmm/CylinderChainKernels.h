@@ -270,12 +270,14 @@ public:
      * @param stepSize    how long the step is
      * @param seed        the seed of the random numbers
      * @param force       the number of the Force among those of the System
+     * @param torque      the torque on hands that a torque stops
      * @param[out] links  the springs of linkers that join two places then
      * @return the number of a linker the rates of which are too large for the step, or -1; or -2 less the number of a
      *         type, if too many of its linkers come out of their concentration
      */
     virtual long long execute(ContextImpl& context, cylchain::LinkerState& state, double kT, double stepSize,
-            std::uint32_t seed, int force, std::vector<cylchain::Link>& links) = 0;
+            std::uint32_t seed, int force, const cylchain::TorqueOnHand& torque,
+            std::vector<cylchain::Link>& links) = 0;
     /**
      * Describe the springs of linkers that join two places.
      */

@@ -28,7 +28,7 @@ public:
         return kinetics->placeFree(state, describeStep(0, seed, force));
     }
     long long execute(ContextImpl& context, cylchain::LinkerState& state, double kT, double stepSize,
-            std::uint32_t seed, int force, std::vector<cylchain::Link>& links);
+            std::uint32_t seed, int force, const cylchain::TorqueOnHand& torque, std::vector<cylchain::Link>& links);
     void describe(const cylchain::LinkerState& state, std::vector<cylchain::Link>& links);
 private:
     cylchain::KineticStep describeStep(double stepSize, std::uint32_t seed, int force) const;

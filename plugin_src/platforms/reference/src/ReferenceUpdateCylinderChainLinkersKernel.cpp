@@ -33,9 +33,10 @@ KineticStep ReferenceUpdateCylinderChainLinkersKernel::describeStep(double stepS
 }
 
 long long ReferenceUpdateCylinderChainLinkersKernel::execute(ContextImpl&, LinkerState& state,
-        double kT, double stepSize, uint32_t seed, int force, vector<Link>& links) {
+        double kT, double stepSize, uint32_t seed, int force, const TorqueOnHand& torque, vector<Link>& links) {
     kinetics->setTemperature(kT);
-    const KineticStep step = describeStep(stepSize, seed, force);
+    KineticStep step = describeStep(stepSize, seed, force);
+    step.torqueOnHand = torque;
     return kinetics->advance(state, step, [&] (int count, const function<void(int)>& iteration) {
         particles->getLoop().run(count, iteration);
     }, &links);

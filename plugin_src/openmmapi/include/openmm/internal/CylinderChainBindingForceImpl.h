@@ -3,6 +3,7 @@
 
 #include "couplings/Contours.h"
 #include "couplings/Links.h"
+#include "couplings/TwistedContour.h"
 #include "kinetics/Linkers.h"
 #include "openmm/CylinderChainBindingForce.h"
 #include "openmm/Kernel.h"
@@ -11,10 +12,12 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace OpenMM {
 
+class CylinderChainForceImpl;
 class CylinderChainIntegrator;
 
 /**
@@ -60,6 +63,13 @@ public:
     void findHeldEnds(std::vector<cylchain::HeldEnd>& ends);
     void findChangesOfEnds(std::vector<cylchain::HeldEnd>& ends) const;
     void findActingHands(std::vector<cylchain::ActingHand>& hands);
+    /**
+     * Add what hands do that follow the helix of chains, in the step that their linkers have taken last.
+     *
+     * @param pairs  of each chain of straight segments
+     * @return whether there are any such hands
+     */
+    bool addTurnedPairs(std::vector<std::vector<cylchain::TurnedPair> >& pairs) const;
     void chainsHaveGrown(ContextImpl& context, const cylchain::ChainList& chains,
             const cylchain::GrowthChanges& changes);
     std::unique_ptr<cylchain::Surroundings> describeSurroundings(const cylchain::ChainList& chains,
@@ -71,6 +81,17 @@ public:
     void restoreState(const StateColumns& columns);
 private:
     template <class Function> void forBoundHands(Function function);
+    /**
+     * Throw an exception unless chains of which hands follow the helix have twist.
+     */
+    void checkHelices(const cylchain::ChainList& chains);
+    cylchain::TwistedContour describeTwist(int chain) const;
+    /**
+     * Find what hands do that follow the helix of chains and have taken a step.
+     *
+     * @param before  the linkers before the step
+     */
+    void findTurnedPairs(const std::vector<cylchain::Linker>& before, double size);
     bool addBranches(const cylchain::GrowthChanges& changes);
     bool removeBrokenBranches();
     void checkDiffusion() const;
@@ -98,6 +119,7 @@ private:
     const CylinderChainIntegrator* findIntegrator() const;
     double getTemperature() const;
     const CylinderChainBindingForce& owner;
+    CylinderChainForceImpl* chainImpl = NULL;
     Kernel linkerKernel;
     std::string parameter;
     cylchain::LinkerState state;
@@ -106,6 +128,10 @@ private:
     std::vector<cylchain::Link> links;
     std::uint32_t seed;
     int number;
+    // Whether hands follow the helix of chains; and what those do that are bound, by the chain.
+
+    bool anyOnHelix = false;
+    std::vector<std::pair<int, cylchain::TurnedPair> > turnedPairs;
     bool upToDate, wasExcluded;
     // Before the last step of the linkers, unless they were given since.
     bool hasStepped;

@@ -90,6 +90,7 @@ private:
     IntegrateCylinderChainStepKernel& getKernel();
     cylchain::BackgroundFlow describeFlow();
     cylchain::StepSettings describeStep(std::uint64_t seed, int level, std::uint64_t step);
+    void describeTurnedPairs(cylchain::StepSettings& settings);
     void recordForces(cylchain::StepSettings& settings, bool records);
     void takeNoteOfForces(const cylchain::StepSettings& settings, bool followsOn);
     void refuseBeams(cylchain::Scheme scheme, double kT) const;
@@ -121,6 +122,9 @@ private:
 
     std::vector<std::vector<cylchain::SegmentForces> > segmentForces;
     bool recorded;
+    // What hands do to the turns of segments of chains with twist.
+
+    std::vector<std::vector<cylchain::TurnedPair> > turnedPairs;
 };
 
 } // namespace OpenMM
