@@ -100,15 +100,20 @@ bool LinkerKinetics::setChains(const ChainList& chains, const vector<ChainCut>& 
             if (!old.isBound() || contours.isClosed(old.chain))
                 continue;
             const int tracked = findTrackedEnd(system.hands[system.types[linker.type].hands[side]], place, before);
+            HandPlace followed = place;
             if (isCut[old.chain] != 0)
                 for (const ChainCut& cut : cuts)
-                    followCut(cut, place);
-            if (!place.isBound() || contours.getLength(place.chain) == 0)
+                    followCut(cut, followed);
+            // What was bound to a part that is gone unbinds as others do: it is counted, and its place is forgotten.
+            if (!followed.isBound() || contours.getLength(followed.chain) == 0)
                 unbind(linker, side, nullptr, count);
-            else if (tracked >= 0)
-                place.position = contours.getEnd(place.chain, tracked);
-            else
-                stayOnChain(linker, side, count);
+            else {
+                place = followed;
+                if (tracked >= 0)
+                    place.position = contours.getEnd(place.chain, tracked);
+                else
+                    stayOnChain(linker, side, count);
+            }
             any = any || place.chain != old.chain || place.position != old.position;
         }
         releaseFromEnd(state, i, held, before, step);
