@@ -8,6 +8,7 @@ from openmm import Context, OpenMMException, Platform, unit
 
 from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..couplings.contact_frames import find_contacts
+from ..couplings.planar_crossings import find_planar_crossing
 from ..errors import InputError, InstabilityError
 from ..kinetics.binding_force import find_binding_force, place_linkers
 from ..output.progress import LateMessages, ProgressMessages
@@ -21,8 +22,12 @@ _MOST_PUSHES, _LOOKED_AT, _JUDGED = 2000, 10, 100
 """Steps in the cold at most, after how many of them contacts are counted, and after how many what they have brought."""
 _FARTHEST, _LEAST_GAIN = 0.2, 0.02
 """How far a push moves a place at most, in diameters, and the share of the energy that so many pushes take away."""
-_APART = 0.1
-"""Chance of the deepest contact from which on there are no more pushes."""
+_LENGTHS = (32.0, 8.0, 4.0, 2.0, 1.0, 1.0, 1.0, 1.0)
+"""Of pushes in turn, over the time in which the fastest contact comes apart; long ones spread what is dense."""
+_LARGEST_ENERGY, _DEEPEST = 3.0, 0.5
+"""Of a contact in k_B T, and how deep it is in shares of its diameter, where pushes end.
+
+Steps at the temperature of the solvent bring back what is in equilibrium, and take long where contacts are deeper."""
 _EXPLICIT_GROUP = 1
 _WARM = (0.1, 0.5, 1.0)
 """Lengths of steps in those of the run or, where those are longer, in recommended ones."""
@@ -41,8 +46,8 @@ def relaxed_positions(configuration, built, say=None, stop=None):
 
     Linkers that begin bound near anchors are bound then, which a Context has that is made or initialised later.
     It takes steps without linkers. In the cold, contacts push with the forces of the start of each step, which is as
-    long as these allow, until none is deeper than chance allows, or more steps bring little; so filaments that lie on
-    each other may go through each other. 60 steps at the temperature of the solvent follow, with contacts in their
+    long as these allow, until none has more than 3 k_B T, or more steps bring little; so filaments that lie on each
+    other may go through each other. 60 steps at the temperature of the solvent follow, with contacts in their
     equations, and more as long as contacts are deeper than chance allows. A filament that would have to go through
     another one then is shifted by a tenth of a diameter, up to three times. The result depends on the configuration
     alone.
@@ -72,11 +77,12 @@ def relaxed_positions(configuration, built, say=None, stop=None):
 
 
 def _progress(say):
-    return LateMessages(say, "filaments that overlap come apart before the first step: {} of at most {} steps", _ALL_STEPS)
+    text = "filaments that overlap come apart before the first step: {} of at most {} steps"
+    return LateMessages(say, text, _ALL_STEPS)
 
 
 def _begun(configuration, built, progress, stop):
-    positions = _come_apart(configuration, built.positions, progress, stop)
+    positions = _come_apart(configuration, built.positions, progress, stop, built.filaments)
     if any(own.bound and own.anchors is not None for own in configuration.linkers):
         _bind_linkers(configuration, built, positions._value)
     return positions
@@ -114,7 +120,7 @@ def relaxed_again(configuration, begun, positions, deleted, stop=None):
         messages.finish()
 
 
-def _come_apart(configuration, positions, progress, stop, begun=None, deleted=frozenset()):
+def _come_apart(configuration, positions, progress, stop, begun, deleted=frozenset()):
     stop = stop or (lambda: None)
     settings, temperature = configuration.simulation, configuration.solvent.temperature
     alone = build_system(configuration, settings.engine, settings.seed, kinetics=False, begun=begun, deleted=deleted)
@@ -130,7 +136,8 @@ def _come_apart(configuration, positions, progress, stop, begun=None, deleted=fr
         precision="double",
         **alone.arguments(),
     )
-    pushes = _Pushes(alone, temperature, max(settings.time_step, recommended.step))
+    box = None if configuration.box is None else box_vectors(configuration.box)
+    pushes = _Pushes(alone, temperature, max(settings.time_step, recommended.step), box)
     reference = Platform.getPlatform("Reference")
     try:
         context = Context(alone.system, integrator, reference)
@@ -172,12 +179,12 @@ def _come_apart(configuration, positions, progress, stop, begun=None, deleted=fr
 class _Pushes:
     # Steps in which contacts push with the forces of the start: that they are many or deep costs no more.
 
-    def __init__(self, alone, temperature, longest):
-        self._temperature, self._longest = temperature or _COLD_TEMPERATURE, longest
+    def __init__(self, alone, temperature, longest, box):
+        self._temperature, self._longest, self._box = temperature or _COLD_TEMPERATURE, longest, box
         self._filaments = alone.filaments
         forces = [as_capsule_contact_force(own) for own in alone.system.getForces()]
         self._forces = [own for own in forces if own is not None]
-        self._smallest, self._rates = math.inf, []
+        self._smallest, self._mobilities = math.inf, []
         mobility = mobilities(alone.filaments, alone.system, alone.particle_friction)
         self._mobility = mobilities_of_ends(alone.filaments, mobility)
         for own in self._forces:
@@ -187,22 +194,23 @@ class _Pushes:
             self._smallest = min(self._smallest, *(value._value for value in diameters))
             of_chains = [self._mobility[list(own.getChainParticles(i))].max(initial=0.0) for i in chains]
             of_spheres = [self._mobility[own.getSphereParticle(i)] for i in spheres]
-            self._rates.append((np.array([*of_chains, 0.0]), np.array([*of_spheres, 0.0])))
+            self._mobilities.append((np.array([*of_chains, 0.0]), np.array([*of_spheres, 0.0])))
 
     def contacts(self, context):
         return [find_contacts(own, context) for own in self._forces]
 
     def push(self, context, integrator, step):
-        """Take steps until contacts are as deep as by chance, or more would bring little."""
+        """Take steps until contacts are shallow, or more would bring little."""
+        begun = _positions(context)
         integrator.setTemperature(_COLD_TEMPERATURE)
         integrator.setExplicitForceGroups(1 << _EXPLICIT_GROUP)
         before = math.inf
         for count in range(_MOST_PUSHES):
             if count % _LOOKED_AT == 0:
                 contacts = self.contacts(context)
-                if _chance_of_deepest(contacts, self._temperature) >= _APART:
+                if all(self._are_shallow(own) for own in contacts):
                     break
-                rate = max(map(_fastest, contacts, self._rates))
+                rate = max(map(_fastest, contacts, self._mobilities))
             if count % _JUDGED == 0:
                 energy = sum(float(_energies(own).sum()) for own in contacts)
                 if energy > (1.0 - _LEAST_GAIN) * before:
@@ -210,12 +218,35 @@ class _Pushes:
                 before = energy
             forces = context.getState(forces=True, groups={_EXPLICIT_GROUP}).getForces(asNumpy=True)._value
             speed = float((np.linalg.norm(forces, axis=1) * self._mobility).max())
-            if speed == 0.0:
+            if speed == 0.0 or rate == 0.0:
                 break
-            lengths = (self._longest, 1.0 / rate if rate > 0.0 else math.inf, _FARTHEST * self._smallest / speed)
-            integrator.setStepSize(min(lengths))
+            own = _LENGTHS[count % len(_LENGTHS)] / rate
+            integrator.setStepSize(min(self._longest, own, _FARTHEST * self._smallest / speed))
             step()
         integrator.setExplicitForceGroups(0)
+        self._refuse_planar_crossings(begun, _positions(context))
+
+    def _are_shallow(self, contacts):
+        # Where axes meet, a step does not know on which sides they are.
+        depths = contacts.gaps / (contacts.gaps - contacts.distances)
+        largest = _LARGEST_ENERGY * thermal_energy(self._temperature)
+        return bool(np.all(depths < _DEEPEST) and np.all(_energies(contacts) < largest))
+
+    def _refuse_planar_crossings(self, begun, pushed):
+        # The equations of later steps would keep them.
+        found = find_planar_crossing(self._filaments, self._box, pushed)
+        if found is None or find_planar_crossing(self._filaments, self._box, begun) is not None:
+            return
+        number, other = found.filament, found.other_filament
+        raise InstabilityError(
+            f"Filament {other} ({self._filaments[other].type.name}) would be pushed through filament {number}.",
+            filament=other,
+            segment=found.other_segment,
+        )
+
+
+def _positions(context):
+    return context.getState(positions=True).getPositions(asNumpy=True)._value
 
 
 def _fastest(contacts, mobilities):
