@@ -61,12 +61,20 @@ class PlanarSegments:
         return np.flatnonzero(inner & (np.abs(between[:, 2]) < 1e-6) & (s > 0.0) & (s < 1.0) & (t > 0.0) & (t < 1.0))
 
 
-def find_planar_crossing(filaments: FilamentCollection, box: FloatArray | None) -> PlanarCrossing | None:
-    """Two segments, if any, that cross each other in one plane where filaments are planar, as they were added."""
+def find_planar_crossing(
+    filaments: FilamentCollection, box: FloatArray | None, positions: FloatArray | None = None
+) -> PlanarCrossing | None:
+    """Two segments, if any, that cross each other in one plane where filaments are planar.
+
+    They are looked at as they were added, or at ``positions`` (particles, 3) in nm of their System.
+    """
     segments = PlanarSegments(box)
     for number, filament in enumerate(filaments):
         if filament.planar:
-            own = number, filament.positions, filament.closed
+            nodes = filament.positions
+            if positions is not None:
+                nodes = positions[filaments.node_indices[number][: len(nodes)]]
+            own = number, nodes, filament.closed
             found = segments.crossing(*own)
             if found is not None:
                 return found

@@ -72,7 +72,7 @@ def steps_of_couplings(
     if not coupled or kT == 0.0:
         return []
     mobility = mobilities(filaments, system, particle_friction)
-    mobility_in_contact = _mobilities_of_ends(filaments, mobility)
+    mobility_in_contact = mobilities_of_ends(filaments, mobility)
     steps = []
     for index, force in coupled:
         label = f"{force.getName()} (force {index})"
@@ -116,7 +116,7 @@ def steps_of_linked_contacts(
     if any(longest > longest_resolving_step(filaments, system, one, particle_friction) for one in capsules):
         return []
     mobility = mobilities(filaments, system, particle_friction)
-    ends = _mobilities_of_ends(filaments, mobility)
+    ends = mobilities_of_ends(filaments, mobility)
     other = f"{pusher.getName()} (force {index})"
     return [_step_with_contacts(*one, other, contact, filaments, ends) for one in links]
 
@@ -167,8 +167,8 @@ def mobilities(filaments: FilamentCollection, system: openmm.System, particle_fr
     return mobility
 
 
-def _mobilities_of_ends(filaments, mobility):
-    # Of ends of filaments that are as short as they can turn.
+def mobilities_of_ends(filaments: FilamentCollection, mobility: FloatArray) -> FloatArray:
+    """The same, and of ends of filaments that are so short that they turn, from what ``mobilities`` gives."""
     result = mobility.copy()
     for filament, nodes in zip(filaments, filaments.node_indices):
         friction = filament.type.segment_friction(filaments.viscosity, filaments.temperature, filament.segments)

@@ -18,6 +18,7 @@ from openmm_cylchain import (
     capsule_contact_force,
 )
 from openmm_cylchain.analysis.crossings import CrossingCounter
+from openmm_cylchain.engine_choice import load_plugin
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
@@ -70,6 +71,34 @@ def test_dense_filaments_do_not_cross_at_the_largest_step():
     assert _count_crossings(filaments, context, 600, box) == 0
     # Below 1 %.
     assert context.getIntegrator().getNumDividedSteps() < 120
+
+
+def test_contacts_of_explicit_force_groups_push_with_the_force_of_the_start():
+    """Two parallel rods without noise that overlap by d/2: each moves by F dt/zeta, however long the step."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    for y in (0.0, DIAMETER / 2):
+        filaments.add_straight(ACTIN, 1, start=(0, y, 0), direction=(1, 0, 0))
+    _, system, positions = filaments.build()
+    system.addForce(capsule_contact_force(filaments, system, DIAMETER, STIFFNESS))
+    system.getForce(system.getNumForces() - 1).setForceGroup(3)
+    friction = ACTIN.segment_friction(VISCOSITY, TEMPERATURE, 1).perpendicular
+    # With its force at the start, the gap grows by twice the overlap.
+    step = 2 * friction / (2 * STIFFNESS)
+    integrator = filaments.create_integrator(system, step, random_seed=1, checks=False)
+    integrator.setTemperature(0)
+    integrator.setExplicitForceGroups(1 << 3)
+    read = openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(integrator))
+    assert load_plugin().CylinderChainIntegrator.cast(read).getExplicitForceGroups() == 1 << 3
+    context = new_context(system, positions, integrator, "Reference", {})
+    integrator.step(1)
+    nodes = positions_of(context)
+    np.testing.assert_allclose(nodes[2:, 1] - nodes[:2, 1], DIAMETER / 2 + 2 * DIAMETER / 2, rtol=1e-6)
+    # In the equations, it cannot come farther apart than it touches.
+    context.setPositions(positions)
+    integrator.setExplicitForceGroups(0)
+    integrator.step(1)
+    nodes = positions_of(context)
+    assert np.all(nodes[2:, 1] - nodes[:2, 1] < 1.01 * DIAMETER)
 
 
 def _steps_of_pairs(clump):

@@ -1,8 +1,12 @@
 """Filaments that begin in planes, hands that begin bound at places, and filaments that have to be shifted."""
 
 import numpy as np
+import openmm
 import pytest
 
+from openmm_cylchain import find_contacts
+from openmm_cylchain.couplings.capsule_contacts import as_capsule_contact_force
+from openmm_cylchain.couplings.planar_crossings import find_planar_crossing
 from openmm_cylchain.errors import InputError, InstabilityError
 from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.created_simulation import begin, create_simulation
@@ -129,6 +133,66 @@ def test_filaments_that_cannot_come_apart_are_shifted(planar, monkeypatch):
     with pytest.raises(InputError, match="have not come apart"):
         relaxed_positions(configuration, built)
     assert len(begun_at) == 4
+
+
+PILE = """
+[solvent]
+temperature = "298 K"
+viscosity = "1 mPa*s"
+[[filament]]
+name = "ROD"
+diameter = "8 nm"
+segment_length = "100 nm"
+persistence_length = "10 um"
+stretching_modulus = "1 nN"
+segments = 2
+count = 100
+inside = { shape = "sphere", radius = "180 nm" }
+KIND
+[contacts]
+diameter = "25 nm"
+[simulation]
+time_step = "1 us"
+duration = "1 ms"
+report_interval = "1 ms"
+seed = 3
+"""
+
+
+def relaxed_with_count(configuration, monkeypatch):
+    """Relaxed positions, the number of steps that they took, and how many were divided, and the System."""
+    built = build_system(configuration, configuration.simulation.engine, configuration.simulation.seed)
+    integrators, steps = [], []
+    make = Filaments.create_integrator
+
+    def noted(*arguments, **options):
+        integrators.append(make(*arguments, **options))
+        return integrators[-1]
+
+    monkeypatch.setattr(Filaments, "create_integrator", noted)
+    positions = relaxed_positions(configuration, built, stop=lambda: steps.append(1))._value
+    return built, positions, len(steps), integrators[0].getNumDividedSteps()
+
+
+def contacts_at(built, positions):
+    (force,) = (own for own in built.system.getForces() if as_capsule_contact_force(own))
+    context = openmm.Context(built.system, openmm.VerletIntegrator(1.0), openmm.Platform.getPlatform("Reference"))
+    context.setPositions(positions)
+    found = find_contacts(force, context)
+    return 0.5 * np.abs(found.forces * found.gaps) / (8.31446261815324e-3 * 298.0)
+
+
+@pytest.mark.parametrize(("kind", "radius", "contacts"), [("", "180 nm", 600), ("planar = true", "500 nm", 200)])
+def test_dense_piles_come_apart_in_few_steps(monkeypatch, kind, radius, contacts):
+    configuration = parse_configuration(PILE.replace("KIND", kind).replace("180 nm", radius))
+    built, positions, steps, divided = relaxed_with_count(configuration, monkeypatch)
+    before, after = contacts_at(built, built.positions), contacts_at(built, positions)
+    # Each filament lies on several others, some almost axis on axis. Equilibrium has less than one k_B T of each.
+    assert len(before) > contacts and before.max() > 39.0 and before.sum() > 2000 > 400 > after.sum()
+    assert len(after) * np.exp(-after.max()) > 3e-4
+    assert steps < 400 and divided == 0
+    assert find_planar_crossing(built.filaments, None, positions) is None
+    np.testing.assert_array_equal(relaxed_positions(configuration, built)._value, positions)
 
 
 FULL = """

@@ -43,8 +43,8 @@ static CylinderChainForceImpl& findChains(ContextImpl& context) {
 
 CylinderChainIntegrator::CylinderChainIntegrator(double temperature, double frictionCoeff, double stepSize) :
         scheme(Implicit), precision(Automatic), pathLevel(0), noiseLevel(0), noiseSeed(0), stepsTaken(0),
-        countAfterSteps(0), dividedSteps(0), workWindow(0), positionsHaveChanged(true), followsOn(false),
-        recordsTensions(false), chains(NULL) {
+        countAfterSteps(0), dividedSteps(0), workWindow(0), explicitGroups(0), positionsHaveChanged(true),
+        followsOn(false), recordsTensions(false), chains(NULL) {
     setTemperature(temperature);
     setFriction(frictionCoeff);
     setStepSize(stepSize);

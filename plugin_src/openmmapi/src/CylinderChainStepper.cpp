@@ -108,7 +108,8 @@ BackgroundFlow CylinderChainStepper::describeFlow() {
 int CylinderChainStepper::getCoupledGroups() const {
     const int groups = integrator.getIntegrationForceGroups();
     const bool includesChains = (groups&(1<<chains.getForceGroup())) != 0;
-    return includesChains && isImplicit(static_cast<Scheme>(integrator.getScheme())) ? groups : 0;
+    const bool couples = includesChains && isImplicit(static_cast<Scheme>(integrator.getScheme()));
+    return couples ? groups & ~integrator.getExplicitForceGroups() : 0;
 }
 
 StepSettings CylinderChainStepper::describeStep(uint64_t seed, int level, uint64_t step) {

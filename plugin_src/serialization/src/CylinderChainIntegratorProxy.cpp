@@ -28,6 +28,7 @@ static void write(const CylinderChainIntegrator& integrator, SerializationNode& 
     node.setBoolProperty("recordsTensions", integrator.getRecordsTensions());
     node.setIntProperty("randomSeed", integrator.getRandomNumberSeed());
     node.setIntProperty("integrationForceGroups", integrator.getIntegrationForceGroups());
+    node.setIntProperty("explicitForceGroups", integrator.getExplicitForceGroups());
     Vec3 velocity, gradientX, gradientY, gradientZ, origin;
     integrator.getFlow(velocity, gradientX, gradientY, gradientZ, origin);
     SerializationNode& flow = node.createChildNode("Flow");
@@ -53,6 +54,7 @@ static unique_ptr<CylinderChainIntegrator> readIntegrator(const SerializationNod
     integrator->setWorkWindow(node.getIntProperty("workWindow"));
     integrator->setRecordsTensions(node.getBoolProperty("recordsTensions"));
     integrator->setIntegrationForceGroups(node.getIntProperty("integrationForceGroups"));
+    integrator->setExplicitForceGroups(node.getIntProperty("explicitForceGroups", 0));
     const SerializationNode& flow = node.getChildNode("Flow");
     integrator->setFlow(readVector(flow, "Velocity"), readVector(flow, "GradientX"), readVector(flow, "GradientY"),
             readVector(flow, "GradientZ"), readVector(flow, "Origin"));

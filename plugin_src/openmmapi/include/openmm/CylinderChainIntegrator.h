@@ -210,6 +210,20 @@ public:
         return dividedSteps;
     }
     /**
+     * Get the force groups of which implicit schemes take all forces at the start of a step, as flags.
+     */
+    int getExplicitForceGroups() const {
+        return explicitGroups;
+    }
+    /**
+     * Set the force groups of which implicit schemes take all forces at the start of a step, also those of links,
+     * contacts and walls that could be in their equations: one bit each, as in setIntegrationForceGroups().  None by
+     * default.  Their stiffness bounds the step then.
+     */
+    void setExplicitForceGroups(int groups) {
+        explicitGroups = groups;
+    }
+    /**
      * Get the number of steps over which the work of explicit forces is averaged.  See setWorkWindow() for details.
      */
     int getWorkWindow() const {
@@ -381,7 +395,7 @@ private:
 
     long long countAfterSteps;
     long long dividedSteps;
-    int workWindow;
+    int workWindow, explicitGroups;
     bool chainsAreAlone, positionsHaveChanged, followsOn, recordsTensions;
     CylinderChainForceImpl* chains;
     std::shared_ptr<CylinderChainStepper> stepper;
