@@ -15,6 +15,9 @@ bind, walk and unbind, and linkers while filaments move:
   by k_s dt/(2 f) between what stands still;
 - hands that bind to sites step between binding and unbinding, along filaments that stand still, which makes them
   slower by (k + k_s v/F_s) dt/2: both are a tenth at most (measured: 8 % slower at a fifth);
+- a hand on a helix that a torque stops is slowed down by what it winds within a step: with the pitch p, the torque T_s
+  at which it stops, and a filament of the torsional rigidity C that takes up the turns over the range R on both sides,
+  the relative change is 4 pi C v dt/(p R T_s), a fifth at most;
 - implicit steps lose the direction of a spring that has a rest length when its ends diffuse by that, as those of
   crosslinks: see ``coupled_step``.
 """
@@ -76,7 +79,7 @@ def steps_of_kinetics(
     for number in range(force.getNumLinkerTypes()):
         first, _, rest, _, _ = force.getLinkerTypeParameters(number)
         label = f"{force.getName()}: type {number}"
-        allowed = _steps_of_type(force, number)
+        allowed = _steps_of_type(force, number) | _steps_on_helix(filaments, force, number)
         if scheme in IMPLICIT_SCHEMES and rest > 0.0 and temperature > 0.0:
             together = _together(largest, first < 0)
             if together > 0.0:
@@ -105,6 +108,21 @@ def _steps_of_type(force, number):
         for what, step in _steps_of_hand(force, hand, stiffness):
             name = f"{force.getName()}: type {number}, {what}"
             allowed[name] = min(step, allowed.get(name, np.inf))
+    return allowed
+
+
+def _steps_on_helix(filaments, force, number):
+    label = f"{force.getName()}: type {number}, what a hand winds in a step slows it down"
+    rigidity = max((own.type.torsional_rigidity or 0.0 for own in filaments), default=0.0)
+    allowed: dict[str, float] = {}
+    for hand in force.getLinkerTypeParameters(number)[:2]:
+        if hand < 0:
+            continue
+        pitch, _, stall, torque_range = force.getHandOnHelix(hand)
+        speed = abs(force.getHandWalking(hand)[0])
+        if pitch != 0.0 and stall > 0.0 and speed * rigidity > 0.0:
+            step = SHARE_OF_RATE * abs(pitch) * torque_range * stall / (4.0 * np.pi * rigidity * speed)
+            allowed[label] = min(step, allowed.get(label, np.inf))
     return allowed
 
 

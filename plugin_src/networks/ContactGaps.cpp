@@ -283,10 +283,13 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
             gaps.get(near[i].number).end = near[i].gap.end;
     });
     findGoing();
+    runInChunks(*loop, near.size(), CHUNK_OF_CONTACT_GAPS, [&] (int i) {
+        if (near[i].hasMoved)
+            near[i].ofNeighbor = isOfNeighbor(near[i]);
+    });
     for (NearPair& own : near) {
         if (!own.hasMoved)
             continue;
-        own.ofNeighbor = isOfNeighbor(own);
         if (own.number >= 0 && own.ofNeighbor)
             gaps.get(own.number).present = own.gap.present = false;
         else if (own.number < 0 && own.gap.numLevers > 0 && own.gap.present && mayClose(own.gap) && !own.ofNeighbor)

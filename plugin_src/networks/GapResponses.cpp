@@ -18,6 +18,8 @@ const double LEAST_PIVOT = 1e-6;
 const double LARGEST_CONTRADICTION = 1e-3;
 /** Rows are longer than needed by this share, so that most gaps that are added find room. */
 const double ROOM_OF_ROWS = 0.25;
+/** Gaps that a thread looks at together. */
+const int CHUNK_OF_PORTS = 256;
 
 } // namespace
 
@@ -139,7 +141,7 @@ void GapResponses::find(const vector<Gap>& gaps, const vector<size_t>& firstEqua
             else
                 findOfPack<double>(gaps, firstEquations, *packs[pack], pack, chainsOfPack[pack], coupled);
     });
-    findOwn();
+    findOwn(loop);
 }
 
 /** Find the responses of some chains, of which those are left that must be found once more. */
@@ -295,11 +297,12 @@ double GapResponses::yieldOf(int gap) const {
 }
 
 /** Find how far forces on gaps move these. */
-void GapResponses::findOwn() {
+void GapResponses::findOwn(const Loop& loop) {
     const size_t count = places.size()/2;
-    own.assign(count, 0.0);
-    ofChains.assign(count, 0.0);
-    for (size_t i = 0; i < count; i++) {
+    own.resize(count);
+    ofChains.resize(count);
+    runInChunks(loop, count, CHUNK_OF_PORTS, [&] (int i) {
+        ofChains[i] = 0;
         forPorts(i, [&] (const ChainPorts& ports, int port) {
             ofChains[i] += ports.responsesOf(port)[port];
         });
@@ -307,5 +310,5 @@ void GapResponses::findOwn() {
         if (one.chain >= 0 && one.chain == other.chain)
             ofChains[i] += 2*chains[one.chain].responsesOf(one.port)[other.port];
         own[i] = max(ofChains[i]+yieldOf(i), LEAST_SHARE_OF_LINKS*ofChains[i]);
-    }
+    });
 }

@@ -137,7 +137,7 @@ private:
             std::vector<int>& chainsOfPack, const CoupledEquations& coupled);
     void yield(int chain);
     double yieldOf(int gap) const;
-    void findOwn();
+    void findOwn(const Loop& loop);
     std::vector<ChainPorts> chains;
     std::vector<int> used;
     /** For each gap and side. */

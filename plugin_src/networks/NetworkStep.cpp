@@ -286,7 +286,7 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
             couplings[i]->linearise(iteration, moved.data(), equations);
         }
         first[couplings.size()] = equations.size();
-        gaps.addEquations(equations);
+        gaps.addEquations(equations, attempt.loop);
         // What the first stage takes for taut segments stays as it is for the second one.
         demands.forTensions = iteration == 0 && stage == 0 && steps[0]->getNumStages() > 1;
         if (!coupled.solve(stepsOfPacks, active, equations, attempt.settings.kT, demands, attempt.loop))

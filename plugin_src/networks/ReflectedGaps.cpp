@@ -88,7 +88,7 @@ int ReflectedGaps::add(const Gap& gap) {
     return gaps.size()-1;
 }
 
-void ReflectedGaps::addEquations(vector<CouplingEquation>& equations) {
+void ReflectedGaps::addEquations(vector<CouplingEquation>& equations, const Loop& loop) {
     if (!gaps.empty())
         responses.setLinks(equations);
     firstEquations.resize(gaps.size()+1);
@@ -99,15 +99,16 @@ void ReflectedGaps::addEquations(vector<CouplingEquation>& equations) {
     }
     firstEquations[gaps.size()] = next;
     equations.resize(next);
-    for (size_t i = 0; i < gaps.size(); i++)
+    runInChunks(loop, gaps.size(), CHUNK_OF_GAPS, [&] (int i) {
         for (int lever = 0; lever < gaps[i].numLevers; lever++) {
             CouplingEquation& equation = equations[firstEquations[i]+lever];
             copy_n(gaps[i].levers[lever].places, 2, equation.places);
             fill_n(equation.force, 3, 0.0);
-            const double force = i < forces.size() && gaps[i].present ? max(0.0, forces[i]) : 0;
+            const double force = gaps[i].present ? max(0.0, getForce(i)) : 0;
             for (int k = 0; k < 6; k++)
                 equation.stiffness[k] = force*gaps[i].turning[k];
         }
+    });
 }
 
 int ReflectedGaps::chooseParts() const {
@@ -275,7 +276,6 @@ void ReflectedGaps::findSharesAtStart(const Loop& loop) {
  * and then all.
  */
 void ReflectedGaps::findPushesOfPart(int part, const Loop& loop) {
-    const int count = gaps.size();
     motions.assign(responses.countPorts()+1, 0.0);
     motionsAtStart.assign(responses.countPorts()+1, 0.0);
     haveMoved.assign(responses.countPorts(), 1);
@@ -327,9 +327,6 @@ void ReflectedGaps::findPushesOfPart(int part, const Loop& loop) {
             converged = largest*rate <= 1-rate;
         }
     }
-    for (int i = 0; i < count; i++)
-        if (roles[i] == Role::Pushed)
-            pushes[(size_t) i*parts+part] = inPart[i].push;
 }
 
 /** Find the forces of gaps from their starts, and their ends without forces. */
@@ -362,7 +359,7 @@ void ReflectedGaps::findPushes(const Loop& loop) {
             if (roles[i] != Role::Pushed)
                 return;
             GapInPart& gap = inPart[i];
-            forces[i] += gap.push;
+            forces[i] += pushes[(size_t) i*parts+part] = gap.push;
             gap.reached = gap.end+motions[gap.ports[0]]+motions[gap.ports[1]];
             if (gap.isReflected)
                 gap.reached = max(gap.reached, 0.0);
@@ -522,10 +519,11 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, const PackFlags& newAct
     findFreeEnds(coupled, loop);
     findPushes(loop);
     vector<double> loads(3*(firstEquations[count]-first));
-    for (size_t i = 0; i < count; i++)
+    runInChunks(loop, count, CHUNK_OF_GAPS, [&] (int i) {
         for (int lever = 0; lever < gaps[i].numLevers; lever++)
             for (int k = 0; k < 3; k++)
                 loads[3*(firstEquations[i]+lever-first)+k] = forces[i]*gaps[i].levers[lever].gradient[k];
+    });
     coupled.push(packs, first, loads, demands, loop);
     predictEnds(coupled, loop);
 }

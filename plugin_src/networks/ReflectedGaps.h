@@ -58,7 +58,7 @@ public:
         return gaps.size();
     }
     /** Add an equation for each gap: it has no force yet, but places. */
-    void addEquations(std::vector<CouplingEquation>& equations);
+    void addEquations(std::vector<CouplingEquation>& equations, const Loop& loop);
     /**
      * Find the forces, and let the equations of an iteration take them, which have been solved without.
      *

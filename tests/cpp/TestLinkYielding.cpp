@@ -198,7 +198,7 @@ private:
         for (const TestLink& link : links)
             equations.push_back(equationOf(link, 1));
         firstGap = equations.size();
-        gaps.addEquations(equations);
+        gaps.addEquations(equations, SERIAL);
         demands.tolerance = 1e-12;
         solve(equations);
         coupled.predictMoves(packs, firstGap, SERIAL);

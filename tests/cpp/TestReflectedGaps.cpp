@@ -108,7 +108,7 @@ public:
                 gap.end = gap.start;
                 gaps.add(gap);
             }
-        gaps.addEquations(equations);
+        gaps.addEquations(equations, SERIAL);
         const vector<PackStep*> packs = {&pack};
         const CoupledEquations::Demands demands;
         const PackFlags active(1, 1);
