@@ -193,6 +193,7 @@ def test_a_torque_stops_a_hand(step):
         assert place_of(own) - START == pytest.approx(expected, rel=0.015)
     assert np.diff(torques_of(own)[[0, -1]]) == pytest.approx(stall, rel=1e-3)
 
+
 def test_the_recommended_step_knows_what_a_hand_winds():
     speed, stall = 1.0 / NANOSECOND, 11.0 * 0.602214
     filaments = Filaments(viscosity=VISCOSITY, temperature=0.0)
@@ -203,7 +204,6 @@ def test_the_recommended_step_knows_what_a_hand_winds():
     allowed = filaments.recommended_time_step(scheme="implicit", system=system).allowed
     found = [step for what, step in allowed.items() if "what a hand winds in a step slows it down" in what]
     assert found == [pytest.approx(0.2 * PITCH * 50.0 * stall / (4.0 * np.pi * ROD.torsional_rigidity * speed))]
-
 
 
 def test_a_hand_is_stopped_at_the_mean_torque():
