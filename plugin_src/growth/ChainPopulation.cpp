@@ -351,8 +351,10 @@ int ChainPopulation::sever(GrowthState& state, const GrowthStep& step, const Gro
     for (int side : {0, 1}) {
         if (stays[side])
             chains.set(targets[side], sides[side].carried.nodes);
-        else
+        else {
             returnMonomers(state, index, ranges[side].size());
+            state.population.vanished++;
+        }
     }
     if (!stays[0] && !stays[1])
         clear(state, index, chains, changes);
