@@ -121,7 +121,9 @@ bool CandidatePairs::follow(bool settled, const double* moved, const GapNoise& n
         search->setMotion(begun, moved, *loop);
     }
     else {
-        motion.follow([&] (int capsule) {return takesPart(capsule);}, moved, slack, *loop, [&] (const vector<int>& capsules) {
+        motion.follow([&] (int capsule) {
+            return takesPart(capsule);
+        }, moved, slack, *loop, [&] (const vector<int>& capsules) {
             search->updateMotion(capsules, moved);
         });
         firstNew = pairs.size();
