@@ -10,8 +10,8 @@ using namespace std;
 namespace {
 
 const int NEWTON_ITERATIONS = 30;
-/** The same where links turn, which several of them at one place do slowly, or gaps are found again. */
-const int NEWTON_ITERATIONS_OF_TURNS = 50;
+/** The same where links turn, which several of them at one place do slowly. */
+const int NEWTON_ITERATIONS_OF_TURNING_LINKS = 50;
 /**
  * Contacts that open and close in turn keep Newton's method from ending. After so many iterations, only this share of
  * each change is made.
@@ -278,7 +278,7 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
         demands.demandingStiffness = max(demands.demandingStiffness, own->getDemandingStiffness());
         demands.tolerance = min(demands.tolerance, own->getRelativeTolerance());
     }
-    const int most = turns || areSoft ? NEWTON_ITERATIONS_OF_TURNS : NEWTON_ITERATIONS;
+    const int most = turns ? NEWTON_ITERATIONS_OF_TURNING_LINKS : NEWTON_ITERATIONS;
     for (int iteration = 0; iteration < most; iteration++) {
         equations.clear();
         for (size_t i = 0; i < couplings.size(); i++) {
