@@ -353,7 +353,7 @@ bool NetworkStep::finishIteration(const vector<size_t>& first) {
         });
     };
     // Where no couplings take many iterations for a few packs, all packs end together, and rests would not pay.
-    const bool rest = !unknown && anyHas(Rests::Worthwhile) && !anyHas(Rests::Wrong);
+    const bool rest = !unknown && anyHas(Rests::Worthwhile) && !anyHas(Rests::Wrong) && gaps.allowRests();
     goingOn.assign(goingOn.size(), !rest);
     for (size_t pack = 0; pack < active.size(); pack++)
         for (size_t lane = 0; lane < chainsOfLanes[pack].size(); lane++)
@@ -369,7 +369,7 @@ void NetworkStep::chooseActive() {
     gaps.markUnfinished(goingOn);
     for (size_t pack = 0; pack < active.size(); pack++)
         active[pack] = any_of(chainsOfLanes[pack].begin(), chainsOfLanes[pack].end(), [&] (int chain) {
-            return !gaps.allowRests() || (chain >= 0 && goingOn[chain]);
+            return chain >= 0 && goingOn[chain];
         });
 }
 

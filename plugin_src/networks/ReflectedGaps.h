@@ -73,7 +73,7 @@ public:
     /** Whether a gap is not where the equations have led it, after its end has been found there. */
     bool isUnfinished(int number) const;
     bool anyUnfinished();
-    /** Whether packs that have converged may rest: one place of a link must not move alone while gaps push it. */
+    /** Whether chains that have converged may rest: one place of a link must not move alone while gaps push it. */
     bool allowRests() const {
         return !responses.haveLinks();
     }
