@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import openmm
@@ -29,13 +29,16 @@ def rows_of_twist(
 
 
 class TwistFile(RecordFile):
-    """A RecordFile with a record at each report: its step, and the twists in radians of all filaments that have any."""
+    """A RecordFile with a record at each report: its step, and the twists in radians of all filaments that have any.
+
+    Those of the joints to the frames of ends are among them.
+    """
 
     def __init__(self, path: Path, filaments: FilamentCollection, count: int | None = None) -> None:
         self._filaments = filaments
         self._numbers = [number for number, own in enumerate(filaments) if has_twist(own.type)]
         joints = sum(len(filaments.node_indices[number]) for number in self._numbers)
-        super().__init__(path, twist_record(joints), "twists", count)
+        super().__init__(path, np.dtype([("step", "<i8"), ("twists", "<f8", (joints,))]), "twists", count)
 
     def measure(self, context: openmm.Context, step: int) -> None:
         """Write the record of a Context."""
@@ -49,8 +52,3 @@ class TwistFile(RecordFile):
         # A filament that has gone has none.
         there = self._filaments[number].takes_part
         return here.twists(number)._value if there else np.zeros(len(self._filaments.node_indices[number]))
-
-
-def twist_record(joints: int) -> np.dtype[Any]:
-    """Of so many joints, those to the frames of ends among them."""
-    return np.dtype([("step", "<i8"), ("twists", "<f8", (joints,))])

@@ -49,10 +49,9 @@ def relaxed_positions(configuration, built, say=None, stop=None):
     It takes steps without linkers. In the cold, contacts push with the forces of the start of each step, which is as
     long as these allow, until none has more than 3 k_B T, or more steps bring little; so filaments that lie on each
     other may go through each other. (Where planar filaments cross, 80 steps with contacts in their equations take the
-    place of these.) 60 steps at the temperature of the solvent follow, with contacts in their
-    equations, and more as long as contacts are deeper than chance allows. A filament that would have to go through
-    another one then is shifted by a tenth of a diameter, up to three times. The result depends on the configuration
-    alone.
+    place of these.) 60 steps at the temperature of the solvent follow, with contacts in their equations, and more as
+    long as contacts are deeper than chance allows. A filament that would have to go through another one then is shifted
+    by a tenth of a diameter, up to three times. The result depends on the configuration alone.
 
     Parameters
     ----------

@@ -571,13 +571,19 @@ bool ReflectedGaps::anyUnfinished() {
     return any;
 }
 
+/** Mark the chains of a gap. */
+template <class Flags> void ReflectedGaps::markChains(int i, Flags& chains) const {
+    for (int side = 0; side < 2; side++)
+        if (gaps[i].packOf(side) >= 0)
+            chains[gaps[i].chainOf(side)] = true;
+}
+
 void ReflectedGaps::markUnfinished(vector<char>& chains) const {
     for (size_t i = 0; i < gaps.size(); i++) {
         // Those that have just been found or turned, or have become none, change what chains are pushed by.
         const bool isOther = i >= predicted.size() || turned[i] || (!gaps[i].present && forces[i] != 0);
-        for (int side = 0; side < 2 && (isOther || isUnfinished(i)); side++)
-            if (gaps[i].packOf(side) >= 0)
-                chains[gaps[i].chainOf(side)] = 1;
+        if (isOther || isUnfinished(i))
+            markChains(i, chains);
     }
     for (int chain : responses.getChains())
         if (!responses.isComplete(chain))
@@ -597,7 +603,6 @@ bool ReflectedGaps::isTorn(int i) const {
 
 void ReflectedGaps::findFailures(vector<bool>& failed) const {
     for (size_t i = 0; i < gaps.size(); i++)
-        for (int side = 0; side < 2 && (isUnfinished(i) || isTorn(i)); side++)
-            if (gaps[i].packOf(side) >= 0)
-                failed[gaps[i].chainOf(side)] = true;
+        if (isUnfinished(i) || isTorn(i))
+            markChains(i, failed);
 }

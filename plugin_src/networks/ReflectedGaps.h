@@ -111,6 +111,7 @@ private:
     bool isTorn(int gap) const;
     bool isBehind(int gap) const;
     bool deviates(int gap, double share) const;
+    template <class Flags> void markChains(int gap, Flags& chains) const;
     std::vector<Gap> gaps;
     GapNoise noise;
     double kT = 0;
