@@ -159,17 +159,17 @@ ContactPair ContactGaps::pairOfLever(const NearPair& own, int lever) const {
  * Find the gap of a pair where an iteration has led, or how far it has moved once iterations move it little.
  *
  * @param again  whether the gap is found in any case
+ * @return whether it is found
  */
-void ContactGaps::follow(NearPair& own, bool again) const {
+bool ContactGaps::follow(NearPair& own, bool again) const {
     const ContactPair& pair = candidates.get(own.pair);
     const double way = candidates.getWay(own.pair), radii = candidates.radiiOf(own.pair);
     const bool isNew = own.way < 0;
     const bool mayMove = own.number < 0 || iterations <= MOVING_ITERATIONS;
-    own.hasMoved = isNew || again || (mayMove && way-own.way > SAME_TOUCH*radii);
-    if (!own.hasMoved) {
+    if (!isNew && !again && !(mayMove && way-own.way > SAME_TOUCH*radii)) {
         if (own.number >= 0)
             own.gap.end = own.offset+findEnd(own);
-        return;
+        return false;
     }
     own.way = way;
     Contact contacts[2];
@@ -208,6 +208,7 @@ void ContactGaps::follow(NearPair& own, bool again) const {
         }
     own.gap.end = own.depth+end.gap;
     own.offset = own.gap.end-findEnd(own);
+    return true;
 }
 
 /** Get whether a gap that is not one of those of the step yet is so likely to be closed that it becomes one. */
@@ -237,15 +238,18 @@ array<int, 3> ContactGaps::around(int capsule) const {
  * gone on. Hard surfaces of the neighbors must not keep them out in the same step.
  */
 void ContactGaps::findGoing() {
-    going.clear();
-    for (const NearPair& own : near) {
+    runInChunks(*loop, near.size(), CHUNK_OF_CONTACT_GAPS, [&] (int i) {
+        const NearPair& own = near[i];
         const ContactPair& pair = candidates.get(own.pair);
         const bool hasGoneOn = own.last[0] != pair.a || own.last[1] != pair.b;
-        if (!own.touchedAtStart || (own.gap.law != GapLaw::Spring && !hasGoneOn))
-            continue;
+        marks[i] = own.touchedAtStart && (own.gap.law == GapLaw::Spring || hasGoneOn);
+    });
+    going.clear();
+    forMarked([&] (const NearPair& own) {
+        const ContactPair& pair = candidates.get(own.pair);
         going.push_back({pair.a, pair.b});
         going.push_back({pair.b, pair.a});
-    }
+    });
     sort(going.begin(), going.end());
 }
 
@@ -270,30 +274,32 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
         near.emplace_back();
         near.back().pair = pair;
     }
+    marks.assign(near.size(), 0);
     runInChunks(*loop, near.size(), CHUNK_OF_CONTACT_GAPS, [&] (int i) {
-        near[i].hasMoved = false;
-        if (near[i].way >= 0 && !candidates.hasMoved(near[i].pair))
+        NearPair& own = near[i];
+        if (own.way >= 0 && !candidates.hasMoved(own.pair))
             return;
-        follow(near[i]);
-        if (near[i].number < 0)
+        marks[i] = follow(own);
+        if (own.number < 0)
             return;
-        if (near[i].hasMoved)
-            gaps.turn(near[i].number, near[i].gap);
+        if (marks[i])
+            gaps.turn(own.number, own.gap);
         else
-            gaps.get(near[i].number).end = near[i].gap.end;
+            gaps.get(own.number).end = own.gap.end;
     });
-    findGoing();
-    runInChunks(*loop, near.size(), CHUNK_OF_CONTACT_GAPS, [&] (int i) {
-        if (near[i].hasMoved)
-            near[i].ofNeighbor = isOfNeighbor(near[i]);
+    vector<NearPair*> found;
+    forMarked([&] (NearPair& own) {found.push_back(&own);});
+    if (!found.empty())
+        findGoing();
+    runInChunks(*loop, found.size(), CHUNK_OF_CONTACT_GAPS, [&] (int i) {
+        found[i]->ofNeighbor = isOfNeighbor(*found[i]);
     });
-    for (NearPair& own : near) {
-        if (!own.hasMoved)
-            continue;
-        if (own.number >= 0 && own.ofNeighbor)
-            gaps.get(own.number).present = own.gap.present = false;
-        else if (own.number < 0 && own.gap.numLevers > 0 && own.gap.present && mayClose(own.gap) && !own.ofNeighbor)
-            own.number = gaps.add(own.gap);
+    for (NearPair* own : found) {
+        Gap& gap = own->gap;
+        if (own->number >= 0 && own->ofNeighbor)
+            gaps.get(own->number).present = gap.present = false;
+        else if (own->number < 0 && gap.numLevers > 0 && gap.present && mayClose(gap) && !own->ofNeighbor)
+            own->number = gaps.add(gap);
     }
     return candidates.mayLackPairs() && !settled;
 }
@@ -301,9 +307,9 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
 bool ContactGaps::followAgain(ReflectedGaps& gaps) {
     const vector<int>& crossed = candidates.getCrossed();
     const double largest = LARGEST_CHANGE*sqrt(kT/stiffness);
+    marks.assign(near.size(), 0);
     runInChunks(*loop, near.size(), CHUNK_OF_CONTACT_GAPS, [&] (int i) {
         NearPair& own = near[i];
-        own.hasMoved = false;
         if (own.number < 0 || own.timesAgain == MOST_TIMES_AGAIN)
             return;
         const bool hasCrossed = binary_search(crossed.begin(), crossed.end(), own.pair);
@@ -314,15 +320,15 @@ bool ContactGaps::followAgain(ReflectedGaps& gaps) {
         again.timesAgain++;
         follow(again, true);
         const bool isOther = again.gap.present != own.gap.present || fabs(again.gap.end-own.gap.end) > largest;
-        if (hasCrossed || (isOther && min(again.gap.end, own.gap.end) < 0))
+        marks[i] = hasCrossed || (isOther && min(again.gap.end, own.gap.end) < 0);
+        if (marks[i])
             own = again;
     });
     bool any = false;
-    for (const NearPair& own : near)
-        if (own.hasMoved) {
-            gaps.turn(own.number, own.gap);
-            any = true;
-        }
+    forMarked([&] (const NearPair& own) {
+        gaps.turn(own.number, own.gap);
+        any = true;
+    });
     return any;
 }
 

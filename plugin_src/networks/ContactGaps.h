@@ -61,9 +61,8 @@ private:
     /** A pair whose gap may be closed, by its number among the candidates. */
     struct NearPair {
         int pair;
-        /** How far the capsules had travelled when it was found, and whether that was in the last iteration. */
+        /** How far the capsules had travelled when it was found. */
         double way = -1;
-        bool hasMoved = true;
         /** At the start, and whether the pair has the contact then. */
         PairGap start;
         bool touchedAtStart = false;
@@ -81,13 +80,19 @@ private:
         bool ofNeighbor = false;
     };
     static PairGap findPairGap(const SegmentPair& pair, const Contact* contacts, int count, double radii);
-    void follow(NearPair& near, bool again = false) const;
+    bool follow(NearPair& near, bool again = false) const;
     int findContactsBeside(const ContactPair& pair, ContactPair& last, Contact* contacts) const;
     ContactPair pairOfLever(const NearPair& near, int lever) const;
     bool mayClose(const Gap& gap) const;
     std::array<int, 3> around(int capsule) const;
     void findGoing();
     bool isOfNeighbor(const NearPair& own) const;
+    /** Call a function with each marked pair. */
+    template <class Function> void forMarked(Function function) {
+        for (std::size_t i = 0; i < near.size(); i++)
+            if (marks[i])
+                function(near[i]);
+    }
     double findEnd(const NearPair& near) const;
     /** Those of steps that do not resolve contacts. */
     ContactEquations hard;
@@ -106,6 +111,8 @@ private:
     std::vector<double> responsesOfCapsules;
     CandidatePairs candidates;
     std::vector<NearPair> near;
+    /** For each of them, whether something is the case. */
+    std::vector<char> marks;
     /** The capsules of pairs whose contacts go on, either way round, in order. */
     std::vector<std::pair<int, int> > going;
 };

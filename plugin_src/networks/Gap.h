@@ -12,7 +12,7 @@ const double LARGEST_GAP_EXPONENT = 4;
 /** By how much responses of gaps that are found from lengths may be too small. */
 const double GAP_RESPONSE_MARGIN = 1.2;
 
-/** How a gap is held open in a step: see ReflectedGaps. */
+/** How a gap is held open in a step: see ReflectedMotion. */
 enum class GapLaw {
     /** By a hard surface at a random depth behind the soft one. */
     Reflection,

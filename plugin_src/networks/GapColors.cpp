@@ -1,12 +1,12 @@
 #include "networks/GapColors.h"
+#include <numeric>
 
 using namespace cylchain;
 using namespace std;
 
 void GapColors::begin() {
-    gaps.clear();
-    firsts.assign(1, 0);
-    colorOf.clear();
+    for (vector<int>* numbers : {&gaps, &firsts, &ends, &colorOf})
+        numbers->clear();
     used.clear();
 }
 
@@ -39,14 +39,15 @@ void GapColors::sort(int count, const GapResponses& responses) {
         return;
     for (int gap = colorOf.size(); gap < count; gap++)
         colorOf.push_back(findColor(gap, responses));
-    firsts.assign(1, 0);
+    ends.clear();
     for (int color : colorOf) {
-        if ((int) firsts.size() < color+2)
-            firsts.resize(color+2, 0);
-        firsts[color+1]++;
+        if ((int) ends.size() <= color)
+            ends.resize(color+1, 0);
+        ends[color]++;
     }
-    for (size_t color = 1; color < firsts.size(); color++)
-        firsts[color] += firsts[color-1];
+    partial_sum(ends.begin(), ends.end(), ends.begin());
+    firsts.assign(ends.size(), 0);
+    copy(ends.begin(), ends.end()-1, firsts.begin()+1);
     gaps.resize(count);
     vector<int> next(firsts);
     for (int gap = 0; gap < count; gap++)

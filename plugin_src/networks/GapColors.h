@@ -23,16 +23,17 @@ public:
      */
     void sort(int count, const GapResponses& responses);
     /** Take those of another order for which a function says so. */
-    template <class Function> void select(const GapColors& all, Function isOne) {
-        gaps.clear();
-        firsts.assign(1, 0);
-        for (std::size_t color = 0; color+1 < all.firsts.size(); color++) {
-            for (int k = all.firsts[color]; k < all.firsts[color+1]; k++)
+    template <class Function> void select(const GapColors& all, const Loop& loop, Function isOne) {
+        gaps.resize(all.gaps.size());
+        firsts = all.firsts;
+        ends.resize(all.ends.size());
+        loop(ends.size(), [&] (int color) {
+            int next = firsts[color];
+            for (int k = firsts[color]; k < all.ends[color]; k++)
                 if (isOne(all.gaps[k]))
-                    gaps.push_back(all.gaps[k]);
-            if ((int) gaps.size() > firsts.back())
-                firsts.push_back(gaps.size());
-        }
+                    gaps[next++] = all.gaps[k];
+            ends[color] = next;
+        });
     }
     /**
      * Call a function with each gap, in their order or against it.
@@ -41,17 +42,17 @@ public:
      */
     template <class Function> double visit(bool backwards, const Loop& loop, Function function) {
         double largest = 0;
-        const int numColors = firsts.size()-1;
+        const int numColors = ends.size();
         for (int i = 0; i < numColors; i++) {
             const int color = backwards ? numColors-1-i : i;
-            const int first = firsts[color], last = firsts[color+1], chunks = (last-first+CHUNK-1)/CHUNK;
+            const int first = firsts[color], last = ends[color], chunks = (last-first+CHUNK-1)/CHUNK;
             auto visitChunk = [&] (int chunk) {
                 double found = 0;
                 for (int k = first+chunk*CHUNK; k < std::min(last, first+(chunk+1)*CHUNK); k++)
                     found = std::max(found, function(gaps[k]));
                 return found;
             };
-            if (chunks == 1) {
+            if (chunks < 2) {
                 largest = std::max(largest, visitChunk(0));
                 continue;
             }
@@ -65,10 +66,10 @@ public:
     }
 private:
     int findColor(int gap, const GapResponses& responses);
-    /** Gaps that a thread goes through, which takes about as long as to wake it up. */
-    static constexpr int CHUNK = 64;
-    /** Sorted by their colors; where each of these begins, and one behind the last. */
-    std::vector<int> gaps, firsts = std::vector<int>(1, 0);
+    /** Gaps that a thread goes through, which takes longer than to take them. */
+    static constexpr int CHUNK = 16;
+    /** Sorted by their colors; where each of these begins and ends. */
+    std::vector<int> gaps, firsts, ends;
     std::vector<int> colorOf;
     /** For each chain, which colors gaps on it have, 64 to a word. */
     std::vector<std::uint64_t> used;

@@ -320,12 +320,12 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
                 more |= own->findGaps(iteration, settled, moved.data(), gaps);
             return more;
         };
-        const bool more = findGaps(false), unfinished = gaps.anyUnfinished();
-        if (!any && !unfinished && !(more && (findGaps(true) || gaps.anyUnfinished()))) {
+        const bool more = findGaps(false), unfinished = gaps.anyUnfinished(attempt.loop);
+        if (!any && !unfinished && !(more && (findGaps(true) || gaps.anyUnfinished(attempt.loop)))) {
             bool others = false;
             for (ImplicitCouplings* own : couplings)
                 others |= own->followAgain(gaps);
-            if (!others || !gaps.anyUnfinished())
+            if (!others || !gaps.anyUnfinished(attempt.loop))
                 return true;
         }
         chooseActive();

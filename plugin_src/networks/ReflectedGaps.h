@@ -3,38 +3,19 @@
 
 #include "networks/CoupledEquations.h"
 #include "networks/Gap.h"
-#include "networks/GapColors.h"
 #include "networks/GapResponses.h"
+#include "networks/ReflectedMotion.h"
 #include <cstddef>
 #include <vector>
 
 namespace cylchain {
 
 /**
- * The forces of contacts and walls in an implicit step.
+ * The gaps of contacts and walls in an implicit step.
  *
- * Let the step without them be linear and reversible, with the equilibrium k_B T K^-1, and C its response to a force
- * that acts during the step. Gaps n with gradients N then keep the equilibrium of hard surfaces at n = 0 exactly,
- * whatever the step and the load, if their forces F are the local times at the end of the step of Brownian motion with
- * the covariance 2 k_B T G, G = N^T C N, that goes from the gaps a at the start to the gaps b at the end without
- * forces and is reflected at zero along G: the end is n = b+G F. All terms of the probability of a step with loads and
- * with modes that relax in it are symmetric in start and end, and the law of reflected motion is exp(-F.n/k_B T) times
- * what is symmetric in a and n. See Harrison and Reiman, Ann. Probab. 1981, 9, 302.
- *
- * For one gap, the motion between a and b has gone to the minimum
- *
- *     m = ((a+b)-((a-b)^2+4 k_B T G E)^(1/2))/2,      F = max(0, -m)/G
- *
- * with an exponential variate E of mean one. Gaps that share chains are found in parts of the step: in each, the ends
- * move on by a share of b-a and by a bridge of Brownian motion with the covariance 2 k_B T G, and every gap takes the
- * law of one, with what others push in this part whole at its end and by a share at its start: what opens the gap by a
- * third; and what closes it the other way round, by 0.4 times the square of the correlation of both, since one is
- * pushed while the other one is open.
- * Gaps that move together have variates E that are correlated as their motion is: those that move as one are reflected
- * as one. With one gap on each chain, all this is exact. Going through the gaps in turn finds the forces of a part;
- * threads do so at once with gaps that share no chain.
- *
- * Soft surfaces are hard ones at random depths: see placeHardSurface().
+ * In each iteration, the equations are solved without their forces, and say where gaps end then. ReflectedMotion finds
+ * the forces from that; the equations take them, and the next iteration begins where they lead. What responses lack of
+ * where they lead is corrected from one iteration to the next.
  */
 class ReflectedGaps {
 public:
@@ -42,7 +23,7 @@ public:
     void begin(const StepSettings& settings, const ChainPlaces& places);
     /** What gaps are drawn with. */
     const GapNoise& getNoise() const {
-        return noise;
+        return motion.getNoise();
     }
     /** Add a gap; returns its number. */
     int add(const Gap& gap);
@@ -72,7 +53,7 @@ public:
             CoupledEquations& coupled, const CoupledEquations::Demands& demands, const Loop& loop);
     /** Whether a gap is not where the equations have led it, after its end has been found there. */
     bool isUnfinished(int number) const;
-    bool anyUnfinished();
+    bool anyUnfinished(const Loop& loop);
     /** Whether chains that have converged may rest: one place of a link must not move alone while gaps push it. */
     bool allowRests() const {
         return !responses.haveLinks();
@@ -86,79 +67,42 @@ public:
         return number < (int) forces.size() ? forces[number] : 0;
     }
 private:
-    int chooseParts() const;
-    void drawNumbers(const Loop& loop);
-    void correlate(const std::vector<double>& normals, std::vector<double>& sums, const Loop& loop) const;
-    void findNoise(const Loop& loop);
     void findRoles(const std::vector<char>& goingOn);
     void complete(const std::vector<PackStep*>& packs, CoupledEquations& coupled, bool single, const Loop& loop);
     bool takesPart(int gap, int side) const;
     bool waits(int gap, int side) const;
-    double motionOf(int gap, int side) const;
-    template <class Function> void moveAll(Function forceOf, const Loop& loop);
+    bool isPushed(int gap, int side) const;
     void findFreeEnds(const CoupledEquations& coupled, const Loop& loop);
     void predictEnds(const CoupledEquations& coupled, const Loop& loop);
-    void findPushes(const Loop& loop);
-    void findPushesOfPart(int part, const Loop& loop);
-    double findPush(int gap, int part) const;
-    double findPushOfSpring(int gap, int part, double end) const;
-    void move(int gap, double push, bool reflects);
-    void moveChain(int gap, int side, double push, bool reflects);
-    void noteMotion(int gap);
-    void findSharesAtStart(const Loop& loop);
-    double scaleOf(int gap) const;
     bool wouldPush(const Gap& gap) const;
     bool isTorn(int gap) const;
     bool isBehind(int gap) const;
     bool deviates(int gap, double share) const;
     template <class Flags> void markChains(int gap, Flags& chains) const;
     std::vector<Gap> gaps;
-    GapNoise noise;
+    GapResponses responses;
+    ReflectedMotion motion {gaps, responses};
     double kT = 0;
     Precision precision = Precision::Double;
-    int parts = 1;
     /** The packs that take part in an iteration. */
     const PackFlags* active = nullptr;
     /**
-     * For each gap: the force and its share in each part; the end without forces, that which is predicted, and by how
-     * much corrections have changed in the last iteration.
+     * For each gap: the force; the end without forces, that which is predicted, and by how much corrections have
+     * changed in the last iteration.
      */
-    std::vector<double> forces, pushes, free, predicted, changes;
+    std::vector<double> forces, free, predicted, changes;
     /**
      * For each side of each gap: how much farther forces have moved it than responses say; the force that its chain had
      * when it moved last, and how far forces would have moved it since.
      */
     std::vector<double> corrections, applied, lacking;
-    /** Whether each gap has got other places or gradients since forces were found. */
-    std::vector<char> turned;
-    /** What an iteration makes of a gap: its force is found, or it shares a chain with such, or it does not. */
-    enum class Role : char {Pushed, Beside, Apart};
-    std::vector<Role> roles;
+    /** Whether each gap has got other places or gradients since forces were found, and how far it has come. */
+    std::vector<char> turned, progress;
+    std::vector<GapRole> roles;
     /** For each chain, whether it has a gap whose force is found. */
     std::vector<char> hasPushed;
     /** The first equation of each gap, and one behind those of all. */
     std::vector<std::size_t> firstEquations;
-    GapResponses responses;
-    /** For each gap and part: exponential variates, a bridge of Brownian motion, and what both are made of. */
-    std::vector<double> reflections, bridges, ofReflections, ofBridges;
-    /** A gap in a part of the step: where it begins and would end without forces, and the force that is found. */
-    struct GapInPart {
-        double start, end, response, ofChains, variate, tolerance, push;
-        /** The end of the part, where the next one begins. */
-        double reached;
-        /** Those that it does not have are behind all others, and do not move. */
-        int ports[2];
-        bool isReflected;
-    };
-    std::vector<GapInPart> inPart;
-    /** All gaps, and those that are pushed in a part. */
-    GapColors all, pushed;
-    /** For each port, how far forces move it in a part, and what of those on other gaps counts at its start. */
-    std::vector<double> motions, motionsAtStart;
-    /** Whether that has changed since its gap was looked at. */
-    std::vector<char> haveMoved;
-    /** For each chain, how far a force on each port moves all others at the start of a part. */
-    std::vector<std::vector<double> > sharesAtStart;
 };
 
 } // namespace cylchain

@@ -92,7 +92,7 @@ public:
             check(gaps.getForce(i) > 0, "a gap is pushed");
             gaps.get(i).end += along(i, coupled.getMoves().data()+3*firstGap);
         }
-        check(!gaps.anyUnfinished(), "the only iteration leads gaps to where responses do");
+        check(!gaps.anyUnfinished(SERIAL), "the only iteration leads gaps to where responses do");
     }
     /** Get how a force moves a gap by itself, but for what links pass on between its two chains. */
     double findResponseOfChains(const vector<TestLink>& links, const TestGap& gap) {
@@ -102,7 +102,7 @@ public:
         check(gaps.getForce(0) > 0, "a gap is pushed");
         return -freeEnd/gaps.getForce(0)-1/STIFFNESS;
     }
-    /** The same with that, from the law of reflection: see ReflectedGaps. Two gaps have the same random numbers. */
+    /** The same with that, from the law of reflection: see ReflectedMotion. Two gaps have the same random numbers. */
     double findResponse(const vector<TestLink>& links, const TestGap& gap) {
         const double ofChains = findResponseOfChains(links, gap);
         auto reflect = [&] (double start, double end) {

@@ -121,7 +121,7 @@ public:
         pack.getPositions(begun.data(), x.data());
         for (int gap = 0; gap < gaps.size(); gap++)
             gaps.get(gap).end = gapOf(gap/numPlanes, gap%numPlanes)+depths[gap];
-        check(!gaps.anyUnfinished(), "the only iteration leads gaps to where they are predicted");
+        check(!gaps.anyUnfinished(SERIAL), "the only iteration leads gaps to where they are predicted");
     }
     Means getMeans(int particle) const {
         return {gapOf(particle, 0), surroundings.energyOfPlanes(at(particle)),
@@ -413,7 +413,7 @@ static void testColors() {
     check(colors.visit(false, loop, visit) == gaps.size()-1.0, "the largest number is another one");
     check(calls > 5, "threads have nothing to do");
     check(count(visits.begin(), visits.end(), 1) == (int) gaps.size(), "a gap is not visited, or twice");
-    some.select(colors, [] (int gap) {return gap%3 == 0;});
+    some.select(colors, SERIAL, [] (int gap) {return gap%3 == 0;});
     order.clear();
     check(some.visit(true, loop, visit) == 2997 && order.size() == 1000, "others are visited");
 }
