@@ -166,7 +166,7 @@ class EndStates:
         reached = _reached_from_first(leaving)
         generator = generator[np.ix_(reached, reached)] / max(np.abs(generator).max(), 1e-300)
         conditions = np.vstack([generator.T, np.ones(len(reached))])
-        shares[reached] = np.linalg.lstsq(conditions, np.eye(len(reached) + 1)[-1], rcond=None)[0]
+        shares[reached] = np.linalg.lstsq(conditions, np.eye(len(reached) + 1)[-1], rcond=None)[0].clip(0.0, 1.0)
         return shares
 
     def net_rate(self, concentration: float) -> float:
