@@ -234,22 +234,23 @@ array<int, 3> ContactGaps::around(int capsule) const {
 }
 
 /**
- * Find pairs whose contacts may become those of their neighbors: the spring of the surface holds them in, or they have
- * gone on. Hard surfaces of the neighbors must not keep them out in the same step.
+ * Whether the contact of a pair may become that of its neighbors: the spring of the surface holds it in, or it has gone
+ * on. Hard surfaces of the neighbors must not keep it out in the same step.
  */
+bool ContactGaps::mayGoOn(const NearPair& own) const {
+    const ContactPair& pair = candidates.get(own.pair);
+    const bool hasGoneOn = own.last[0] != pair.a || own.last[1] != pair.b;
+    return own.touchedAtStart && (own.gap.law == GapLaw::Spring || hasGoneOn);
+}
+
 void ContactGaps::findGoing() {
-    runInChunks(*loop, near.size(), CHUNK_OF_CONTACT_GAPS, [&] (int i) {
-        const NearPair& own = near[i];
-        const ContactPair& pair = candidates.get(own.pair);
-        const bool hasGoneOn = own.last[0] != pair.a || own.last[1] != pair.b;
-        marks[i] = own.touchedAtStart && (own.gap.law == GapLaw::Spring || hasGoneOn);
-    });
     going.clear();
-    forMarked([&] (const NearPair& own) {
-        const ContactPair& pair = candidates.get(own.pair);
-        going.push_back({pair.a, pair.b});
-        going.push_back({pair.b, pair.a});
-    });
+    for (size_t i = 0; i < near.size(); i++)
+        if (goOn[i]) {
+            const ContactPair& pair = candidates.get(near[i].pair);
+            going.push_back({pair.a, pair.b});
+            going.push_back({pair.b, pair.a});
+        }
     sort(going.begin(), going.end());
 }
 
@@ -274,21 +275,26 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
         near.emplace_back();
         near.back().pair = pair;
     }
-    marks.assign(near.size(), 0);
+    areFound.assign(near.size(), 0);
+    goOn.resize(near.size());
     runInChunks(*loop, near.size(), CHUNK_OF_CONTACT_GAPS, [&] (int i) {
         NearPair& own = near[i];
         if (own.way >= 0 && !candidates.hasMoved(own.pair))
             return;
-        marks[i] = follow(own);
+        areFound[i] = follow(own);
+        if (areFound[i])
+            goOn[i] = mayGoOn(own);
         if (own.number < 0)
             return;
-        if (marks[i])
+        if (areFound[i])
             gaps.turn(own.number, own.gap);
         else
             gaps.get(own.number).end = own.gap.end;
     });
     vector<NearPair*> found;
-    forMarked([&] (NearPair& own) {found.push_back(&own);});
+    for (size_t i = 0; i < near.size(); i++)
+        if (areFound[i])
+            found.push_back(&near[i]);
     if (!found.empty())
         findGoing();
     runInChunks(*loop, found.size(), CHUNK_OF_CONTACT_GAPS, [&] (int i) {
@@ -307,7 +313,7 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
 bool ContactGaps::followAgain(ReflectedGaps& gaps) {
     const vector<int>& crossed = candidates.getCrossed();
     const double largest = LARGEST_CHANGE*sqrt(kT/stiffness);
-    marks.assign(near.size(), 0);
+    areFound.assign(near.size(), 0);
     runInChunks(*loop, near.size(), CHUNK_OF_CONTACT_GAPS, [&] (int i) {
         NearPair& own = near[i];
         if (own.number < 0 || own.timesAgain == MOST_TIMES_AGAIN)
@@ -320,16 +326,14 @@ bool ContactGaps::followAgain(ReflectedGaps& gaps) {
         again.timesAgain++;
         follow(again, true);
         const bool isOther = again.gap.present != own.gap.present || fabs(again.gap.end-own.gap.end) > largest;
-        marks[i] = hasCrossed || (isOther && min(again.gap.end, own.gap.end) < 0);
-        if (marks[i])
-            own = again;
-    });
-    bool any = false;
-    forMarked([&] (const NearPair& own) {
+        areFound[i] = hasCrossed || (isOther && min(again.gap.end, own.gap.end) < 0);
+        if (!areFound[i])
+            return;
+        own = again;
+        goOn[i] = mayGoOn(own);
         gaps.turn(own.number, own.gap);
-        any = true;
     });
-    return any;
+    return find(areFound.begin(), areFound.end(), 1) != areFound.end();
 }
 
 void ContactGaps::findFailures(const double*, vector<bool>& failed) {

@@ -85,14 +85,9 @@ private:
     ContactPair pairOfLever(const NearPair& near, int lever) const;
     bool mayClose(const Gap& gap) const;
     std::array<int, 3> around(int capsule) const;
+    bool mayGoOn(const NearPair& own) const;
     void findGoing();
     bool isOfNeighbor(const NearPair& own) const;
-    /** Call a function with each marked pair. */
-    template <class Function> void forMarked(Function function) {
-        for (std::size_t i = 0; i < near.size(); i++)
-            if (marks[i])
-                function(near[i]);
-    }
     double findEnd(const NearPair& near) const;
     /** Those of steps that do not resolve contacts. */
     ContactEquations hard;
@@ -111,8 +106,8 @@ private:
     std::vector<double> responsesOfCapsules;
     CandidatePairs candidates;
     std::vector<NearPair> near;
-    /** For each of them, whether something is the case. */
-    std::vector<char> marks;
+    /** For each of them, whether its gap has been found anew, and whether its contact may become that of neighbors. */
+    std::vector<char> areFound, goOn;
     /** The capsules of pairs whose contacts go on, either way round, in order. */
     std::vector<std::pair<int, int> > going;
 };
