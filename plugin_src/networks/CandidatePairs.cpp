@@ -187,15 +187,15 @@ void CandidatePairs::select(int firstNew) {
         const int first = chunk*CHUNK_OF_CANDIDATES, last = min(count, first+CHUNK_OF_CANDIDATES);
         drawSurfaces(max(first, firstNew), last);
         for (int i = first; i < last; i++) {
-            const ContactPair& pair = get(i);
-            const double way = getWay(i), radii = radiiOf(i);
-            double room;
-            if (rooms[i] < 0 || (i < firstNew && way < rooms[i]))
+            if (rooms[i] < 0 || (i < firstNew && getWay(i) < rooms[i]))
                 continue;
+            const ContactPair& pair = get(i);
+            const double radii = i < firstNew ? 0 : radiiOf(i);
+            double room;
             if (places->areHeld(pair))
                 rooms[i] = HUGE_VAL;
             else if (i >= firstNew && pair.clearance > 0 && !mayClose(i, pair.before-radii, pair.distance-radii, room))
-                rooms[i] = way+min(room, (double) pair.clearance);
+                rooms[i] = getWay(i)+min(room, (double) pair.clearance);
             else
                 looks.add(i, pair);
         }
