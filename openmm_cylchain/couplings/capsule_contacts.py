@@ -123,7 +123,7 @@ def capsule_contact_force(
     Returns
     -------
     CylinderChainContactForce
-        To be added to the System. It works on the Reference and CPU platforms. Its ``addExclusion`` lets further pairs
+        To be added to the System. It works where the compiled engine does. Its ``addExclusion`` lets further pairs
         not touch each other.
 
     Raises

@@ -117,7 +117,7 @@ class ForceReaders:
 def wall_forces(context: openmm.Context) -> list[WallForces]:
     """The mean forces of the walls of a Context since this was asked last, or since the Context was made.
 
-    Of walls of ``filament_wall_force``, all steps of the compiled engine on the CPU and Reference platforms count. A
+    Of walls of ``filament_wall_force``, all steps of the compiled engine count. A
     step of scheme "implicit" knows the mean within itself; in explicit schemes, the force is that at its start. In each
     case it is what has moved the filaments: in equilibrium, it balances what presses on them. Checkpoints hold the
     sums, so that a run which goes on from one has the same means as one that was not interrupted; States do not.

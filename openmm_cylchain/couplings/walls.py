@@ -114,7 +114,7 @@ def filament_wall_force(
     Returns
     -------
     CylinderChainWallForce
-        To be added to the System. It works on the Reference and CPU platforms. ``setRegion``, ``setStiffness`` and
+        To be added to the System. It works where the compiled engine does. ``setRegion``, ``setStiffness`` and
         ``updateParametersInContext`` move and change the wall.
 
     Raises

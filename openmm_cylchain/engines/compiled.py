@@ -1,5 +1,6 @@
-"""The compiled engine: a CylinderChainForce and a CylinderChainIntegrator from the plugin, on the Reference and CPU
-platforms. Those for GPUs are in gpu_platforms.py.
+"""The compiled engine: a CylinderChainForce and a CylinderChainIntegrator from the plugin.
+
+It is there on the platforms Reference and CPU, and on those for GPUs that gpu_platforms.py turns on.
 
 Importing this module loads the plugin into OpenMM. An ImportError says why that cannot be done.
 """
@@ -86,7 +87,7 @@ _EACH_ITS_OWN = 0.0
 
 
 class CompiledEngine(Engine):
-    """The compiled engine: a CylinderChainForce and a CylinderChainIntegrator, on the Reference and CPU platforms."""
+    """The compiled engine: a CylinderChainForce and a CylinderChainIntegrator."""
 
     has_linkers = True
     has_growth = True
