@@ -13,7 +13,8 @@ import openmm
 from ..engine_choice import available_engines, choose_engine
 from ..errors import ContactWarning, InputError
 from ..filaments.chain_type import ChainType
-from ..filaments.collection import FilamentCollection, require_filaments
+from ..filaments.collection import FilamentCollection, held_numbers, require_filaments
+from ..filaments.filaments_that_take_part import FilamentsThatTakePart
 from ..filaments.grown import longest_segment
 from ..units.quantities import (
     LARGEST_INT,
@@ -24,7 +25,7 @@ from ..units.quantities import (
     true_or_false,
     whole_number,
 )
-from ..units.types import Indices, Numbers, Scalar
+from ..units.types import Indices, IntArray, Numbers, Scalar
 from .contacts import SAFE_BARRIER, filament_diameters, outside_particles, particle_diameters
 from .periodicity import default_box, is_periodic
 from .planar_crossings import find_planar_crossing
@@ -76,6 +77,7 @@ def capsule_contact_force(
     particle_diameter: Numbers | None = None,
     excluded_neighbors: int | None = None,
     periodic: bool | None = None,
+    numbers: Indices | None = None,
 ) -> Any:
     """A repulsion between segments of filaments, and other particles as spheres: of all of them with each other.
 
@@ -102,9 +104,9 @@ def capsule_contact_force(
         In the System. Those of beam elements have beads, others need none.
     system : openmm.System
         With all of its particles. The force is not added to it.
-    diameter : length, or (filaments,) array of lengths
-        Distance of two axes at which filaments touch: that of the cylinders, or more. Nothing where there are only
-        bodies.
+    diameter : length, or array of lengths, one for each filament that takes part
+        Distance of two axes at which filaments of the same diameter touch: that of the cylinders, or more. Nothing
+        where there are only bodies.
     stiffness : energy/length^2, optional
         k; that of ``default_capsule_stiffness`` for the thinnest filament if not given: crossing costs 40 k_B T. That
         of the smallest sphere where there are no filaments. ``setStiffness`` and ``updateParametersInContext`` change
@@ -119,6 +121,8 @@ def capsule_contact_force(
     periodic : bool, optional
         Whether distances are those of nearest images. If not given: whether the System has a box, or another force
         that is periodic.
+    numbers : sequence of int, optional
+        Of the filaments that take part; nothing touches others. All of them if not given.
 
     Returns
     -------
@@ -129,10 +133,10 @@ def capsule_contact_force(
     Raises
     ------
     InputError
-        If the compiled engine is missing, a particle does not exist or is one of the filaments', a diameter or
-        stiffness is not positive, nothing could touch, the box is narrower than twice a segment with its diameter, or
-        a filament of beam elements has no beads. Implicit schemes need a box as wide as twice a segment with two
-        diameters: a Context with a narrower one is refused.
+        If the compiled engine is missing, a filament or a particle does not exist, or a particle is one of the
+        filaments', a diameter or stiffness is not positive, nothing could touch, the box is narrower than twice a
+        segment with its diameter, or a filament of beam elements has no beads. Implicit schemes need a box as wide as
+        twice a segment with two diameters: a Context with a narrower one is refused.
 
     Warns
     -----
@@ -144,10 +148,11 @@ def capsule_contact_force(
     from .. import plugin
 
     require_filaments(filaments)
+    spheres = outside_particles(filaments, system, particles)
+    filaments = FilamentsThatTakePart(filaments, held_numbers(numbers, len(filaments)))
     diameters = np.zeros(0)
     if len(filaments) or diameter is not None:
         diameters = filament_diameters(diameter, len(filaments))
-    spheres = outside_particles(filaments, system, particles)
     sphere_diameters = particle_diameters(particles, particle_diameter)
     for own in (*diameters, *sphere_diameters):
         _refuse_size(own)
@@ -181,6 +186,14 @@ def capsule_contact_force(
     return force
 
 
+def owners_of_chains(contacts: Any, filaments: FilamentCollection) -> IntArray:
+    """Numbers of the filaments that are the chains of a CylinderChainContactForce; -1 of one that is none."""
+    owners = {int(particle): one.filament for particle, one in zip(filaments.attachment_indices, filaments.attachments)}
+    owners |= {int(nodes[0]): number for number, nodes in enumerate(filaments.node_indices)}
+    firsts = (contacts.getChainParticles(chain)[0] for chain in range(contacts.getNumChains()))
+    return np.array([owners.get(first, -1) for first in firsts], dtype=int)
+
+
 def as_capsule_contact_force(force: openmm.Force) -> Any | None:
     """A force as the CylinderChainContactForce that it is, or None if it is another one."""
     if available_engines()["compiled"] is not None:
@@ -204,9 +217,9 @@ def _exclude_within_bodies(force, filaments, spheres):
 
 
 def _require_beads(filaments, diameters):
-    for number, (filament, beads) in enumerate(zip(filaments, filaments.bead_indices)):
+    for number, filament, beads, own in zip(filaments.numbers, filaments, filaments.bead_indices, diameters):
         if not (filament.type.segment_kind.straight or len(beads)):
-            spacing = contact_spacing(filament.type, diameters[number], filaments.temperature)
+            spacing = contact_spacing(filament.type, own, filaments.temperature)
             raise InputError(
                 f"Filament {number} ({filament.type.name}) has beam elements, whose capsules lie between beads on its "
                 f"curve: call filaments.add_beads({number}, {spacing:g}) before the filaments are built."
@@ -251,15 +264,16 @@ def _check_box(system, filaments, diameter):
 
 def _warn_of_barrier(filaments, diameters, sphere_diameters, stiffness):
     kT = thermal_energy(filaments.temperature)
-    for what, own in (("Filament", diameters), ("Sphere", sphere_diameters if len(sphere_diameters) > 1 else ())):
-        if not len(own):
+    spheres = range(len(sphere_diameters)) if len(sphere_diameters) > 1 else ()
+    for what, numbers, own in (("Filament", filaments.numbers, diameters), ("Sphere", spheres, sphere_diameters)):
+        if not len(numbers):
             continue
-        number = int(np.argmin(own))
-        barrier = 0.5 * stiffness * own[number] ** 2
+        thinnest = int(np.argmin(own))
+        barrier = 0.5 * stiffness * own[thinnest] ** 2
         if barrier < SAFE_BARRIER * kT:
             warnings.warn(
-                f"{what} {number} has a contact diameter of {own[number]:.3g} nm: others of its kind can pass "
-                f"through it for {barrier / kT:.3g} k_B T. Use a larger stiffness.",
+                f"{what} {numbers[thinnest]} has a contact diameter of {own[thinnest]:.3g} nm: others of its kind can "
+                f"pass through it for {barrier / kT:.3g} k_B T. Use a larger stiffness.",
                 ContactWarning,
                 stacklevel=3,
             )
@@ -268,10 +282,11 @@ def _warn_of_barrier(filaments, diameters, sphere_diameters, stiffness):
 def _warn_of_planar_crossing(filaments, box):
     found = find_planar_crossing(filaments, box)
     if found is not None:
+        one, other = (filaments.numbers[number] for number in (found.filament, found.other_filament))
         warnings.warn(
-            f"Segment {found.segment} of filament {found.filament} and segment {found.other_segment} of filament "
-            f"{found.other_filament} cross each other in one plane. Planar filaments stay so until an end comes out, "
-            "and what long steps give of them until then is wrong. Place them where they do not cross.",
+            f"Segment {found.segment} of filament {one} and segment {found.other_segment} of filament {other} cross "
+            "each other in one plane. Planar filaments stay so until an end comes out, and what long steps give of "
+            "them until then is wrong. Place them where they do not cross.",
             ContactWarning,
             stacklevel=3,
         )

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..filaments.collection import FilamentCollection, require_filaments
 from ..units.quantities import require_kind
 from ..units.types import IntArray
-from .capsule_contacts import as_capsule_contact_force
+from .capsule_contacts import as_capsule_contact_force, owners_of_chains
 from .walls import as_filament_wall_force, shape_of_wall
 
 _FORCE = unit.kilojoule_per_mole / unit.nanometer
@@ -59,13 +59,15 @@ class ContactForces:
     ----------
     force : int
         The number of the Force in the System.
+    contacts : CylinderChainContactForce
     duration : time
         Of the steps over which forces are means; 0 for those at the present positions.
     forces : (particles, 3) force
         On each particle of the System, those that nothing touches among them.
     pairs : (pairs, 2) array of int
-        The filaments that have touched each other. Particles outside filaments have numbers behind those, in the order
-        of ``particles`` of ``capsule_contact_force``. A filament that touches itself makes a pair with itself.
+        The filaments that have touched each other, as places in ``numbers`` of ``capsule_contact_force``. Particles
+        outside filaments have numbers behind those, in the order of its ``particles``. A filament that touches itself
+        makes a pair with itself.
     loads : (pairs,) force
         The sum of the sizes of the forces of a pair.
     sums : (pairs, 3) force
@@ -73,6 +75,7 @@ class ContactForces:
     """
 
     force: int
+    contacts: Any
     duration: Any
     forces: Any
     pairs: IntArray
@@ -87,11 +90,13 @@ class ContactForces:
         """The sum of the sizes of all forces on each filament: an array (filaments,) with units."""
         require_filaments(filaments)
         _refuse_others(self.forces, filaments)
-        loads = np.zeros(max(len(filaments), int(self.pairs.max(initial=-1)) + 1))
-        np.add.at(loads, self.pairs[:, 0], self.loads._value)
+        # Behind filaments stands what is none.
+        loads, owners = np.zeros(len(filaments) + 1), owners_of_chains(self.contacts, filaments)
+        numbers = np.append(owners, -1)[np.minimum(self.pairs, len(owners))]
+        np.add.at(loads, numbers[:, 0], self.loads._value)
         other = self.pairs[:, 0] != self.pairs[:, 1]
-        np.add.at(loads, self.pairs[other, 1], self.loads._value[other])
-        return unit.Quantity(loads[: len(filaments)], _FORCE)
+        np.add.at(loads, numbers[other, 1], self.loads._value[other])
+        return unit.Quantity(loads[:-1], _FORCE)
 
 
 class ForceReaders:
@@ -217,7 +222,7 @@ def _contact_forces(context: openmm.Context, readers: Mapping[int, int]) -> list
             continue
         duration, forces, pairs, sums, loads = _taken(own, context, readers.get(number, 0))
         quantities = (unit.Quantity(value, _FORCE) for value in (loads, sums))
-        found.append(ContactForces(number, duration, unit.Quantity(forces, _FORCE), pairs, *quantities))
+        found.append(ContactForces(number, own, duration, unit.Quantity(forces, _FORCE), pairs, *quantities))
     return found
 
 

@@ -15,7 +15,7 @@ import openmm
 
 from ..engine_choice import available_engines, choose_engine
 from ..errors import InputError
-from ..filaments.collection import FilamentCollection, require_filaments
+from ..filaments.collection import FilamentCollection, held_numbers, require_filaments
 from ..units.quantities import LENGTH, STIFFNESS, in_units_of, one_of, positive, shown, whole_numbers
 from ..units.types import FloatArray, Indices, Numbers, Scalar
 from .contacts import outside_particles
@@ -131,7 +131,7 @@ def filament_wall_force(
         raise InputError(f"shape must be a Shape such as Sphere, but is {shown(shape)}.")
     stiffness = positive(stiffness, STIFFNESS, "stiffness")
     require_filaments(filaments)
-    held = _held(numbers, len(filaments))
+    held = held_numbers(numbers, len(filaments))
     one_of(side, SIDES, "side")
     one_of(nodes, NODES, "nodes")
     if side != "inside" and len(shape.faces) > 1:
@@ -158,18 +158,6 @@ def filament_wall_force(
     for particle, value in zip(spheres, sphere_radii):
         force.addParticle(int(particle), float(value))
     return force
-
-
-def _held(numbers, count):
-    if numbers is None:
-        return range(count)
-    held = whole_numbers(numbers, 0, "numbers")
-    for index in held:
-        if index >= count:
-            raise InputError(f"Filament {index} does not exist; there are {count}.")
-    if len(set(held)) < len(held):
-        raise InputError(f"numbers must be those of different filaments, but are {list(held)}.")
-    return held
 
 
 def _radii(value, count, name, room):

@@ -13,7 +13,7 @@ from .filaments import add_on_body, first_length, shared_growth
 from .places import draw_inside, draw_position, region_of, unknown_position
 from .script import count_of
 from .settings import OFF, Settings
-from .simulation import STILL
+from .simulation import STILL, contact_diameter
 
 KINDS = ("bead", "solid", "sphere", "aster")
 _ONE_SINGLE = re.compile(r"(\d+\s+)?([A-Za-z_]\w*)\s*(.*)", re.DOTALL)
@@ -421,7 +421,7 @@ def _add_fibers(translation, new, aster, made, outer, inner, draw):
         return
     # What a [[filament]] table has that stands by itself.
     if kind in _TYPES:
-        inner, crowded = _least_distance(translation, inner, int(number))
+        inner, crowded = _least_distance(translation, inner, int(number), contact_diameter(translation, fiber))
         wanted = abs(outer - inner)
         where = {"distance": quantity(inner, "um"), "spread": "even" if crowded else _TYPES[kind]}
         if crowded:
@@ -441,7 +441,9 @@ def _add_fibers(translation, new, aster, made, outer, inner, draw):
     exact = arm == wanted
     text = "stiffness and radius of the aster" + ("" if exact else ", the second spring nearer where fibers are short")
     made.table.add("filaments", held, Note(EXACT if exact else NEAREST, text, new.line))
-    if made.steric is not None:
+    if made.steric is not None and contact_diameter(translation, fiber) is None:
+        made.table.add("contacts", True, Note(EXACT, "steric", made.steric))
+    elif made.steric is not None:
         text = "contacts of bodies that hold fibers"
         made.table.comment(Note(LEFT_OUT, text, made.steric, text))
         made.steric = None
@@ -495,14 +497,14 @@ def _apart_on_disc(translation, options, number, outer, generator):
     return np.array(found)
 
 
-def _least_distance(translation, distance, count):
+def _least_distance(translation, distance, count, diameter):
     # From which filaments that are spread evenly do not overlap, and whether the distance was less.
-    if translation.contact_diameter is None or count < 2:
+    if diameter is None or count < 2:
         return distance, False
     if translation.dimensions == 2:
-        least = 0.5 * translation.contact_diameter / math.sin(math.pi / count)
+        least = 0.5 * diameter / math.sin(math.pi / count)
     else:
         # Neighbours on the spiral are at least 3.09/sqrt(n) apart.
-        least = translation.contact_diameter / (2.0 * math.sin(min(0.5 * 3.0 / math.sqrt(count), 0.5 * math.pi)))
+        least = diameter / (2.0 * math.sin(min(0.5 * 3.0 / math.sqrt(count), 0.5 * math.pi)))
     least *= _LEAST_GAP
     return (least, True) if distance < least else (distance, False)

@@ -20,6 +20,7 @@ from .growth import longest_of, read_growth, same_growth, still_growth
 from .places import draw_inside, region_of, unknown_position
 from .script import count_of
 from .settings import OFF
+from .simulation import contact_diameter
 
 _DRAG = 3.0
 """Of a cylinder that turns in all directions: 3 pi viscosity length/(ln(length/diameter) + 0.32)."""
@@ -205,7 +206,8 @@ def add_type(translation, table, fiber, segment, length):
     modulus = max(16.0 * rigidity / (2.0 * radius) ** 2, 1e4 * translation.thermal_energy / segment, 1000.0)
     note = Note(NEAREST, "Cytosim's fibers have no length but one: these stretch next to nothing")
     table.add("stretching_modulus", quantity(modulus, "pN"), note)
-    diameter = min(2.0 * radius, translation.contact_diameter or math.inf)
+    diameter = min(2.0 * radius, contact_diameter(translation, fiber) or math.inf)
+    translation.tables_by_fiber.append((table, fiber))
     table.add("diameter", quantity(diameter, "um"), Note(EXACT, "of drag_radius, or of steric if that is less"))
     _add_friction(translation, table, settings, segment, length, radius, diameter)
     force = settings.number("colinear_force", default=0.0)

@@ -48,50 +48,47 @@ def add_solvent(translation):
         table.add("velocity", [quantity(own, "um/s") for own in flow], Note(EXACT, "flow"))
 
 
-def contact_diameter(script):
-    """The distance in um at which fibers touch, or None if they do not."""
-    simul = script.simul
-    if simul.text("steric") in OFF:
+def contact_diameter(translation, fiber):
+    """The distance in um at which fibers of a Property touch each other, or None if nothing touches them."""
+    settings = fiber.settings
+    if translation.script.simul.text("steric") in OFF or settings.text("steric") in OFF:
         return None
-    radii = [_steric_radius(own.settings) for own in script.properties.values() if own.kind == "fiber"]
-    return 2.0 * max(radii, default=0.0) or None
-
-
-def _steric_radius(settings):
-    if settings.text("steric") in OFF:
-        return 0.0
-    return max(0.0, settings.number(("steric", 1), "steric_radius", default=0.0))
+    return max(0.0, 2.0 * settings.number(("steric", 1), "steric_radius", default=0.0)) or None
 
 
 def add_contacts(translation):
-    """The [contacts] table, if fibers or bodies touch each other."""
-    simul, diameter = translation.script.simul, translation.contact_diameter
-    radii = {fiber.name: _steric_radius(fiber.settings) for fiber in translation.fibers_made()}
-    for fiber in translation.fibers_made():
+    """The [contacts] table, if fibers or bodies touch each other, and what tables of fibers say of it."""
+    simul, fibers = translation.script.simul, translation.fibers_made()
+    diameters = {fiber.name: contact_diameter(translation, fiber) for fiber in fibers}
+    for fiber in fibers:
         extra = fiber.settings.number(("steric", 2), "steric_range", default=0.0)
         pull = simul.number(("steric", 2), "steric_stiff_pull", default=0.0)
-        if diameter and extra > 0.0 and pull > 0.0:
+        if diameters[fiber.name] and extra > 0.0 and pull > 0.0:
             line = fiber.settings.line_of("steric")
             translation.left_out(f"the attraction of {fiber.name} beyond contact", line, "contacts that attract")
-    of_bodies = [own.steric for own in translation.bodies if own.steric is not None]
-    of_fibers = diameter is not None and any(radii.values())
-    # In another stage, there may be some.
-    any_fibers = any(own.kind == "fiber" for own in translation.script.properties.values())
-    if any_fibers and not of_fibers and of_bodies:
-        text = "contacts of bodies, beside fibers that do not touch each other"
-        translation.left_out(text, of_bodies[0], "contacts that differ between filaments")
-    if not of_fibers and (any_fibers or not of_bodies):
+    bodies = [own for own in translation.bodies if own.steric is not None]
+    touching = [name for name, own in diameters.items() if own is not None]
+    largest = max((diameters[name] for name in touching), default=None)
+    if largest is None and not bodies:
         return
     table = translation.document.table("[contacts]", simul.line_of("steric"))
-    if of_fibers:
-        table.add("diameter", quantity(diameter, "um"), Note(EXACT, "twice the radius of steric"))
+    if largest is not None:
+        table.add("diameter", quantity(largest, "um"), Note(EXACT, "twice the radius of steric"))
+    for of_fibers, fiber in translation.tables_by_fiber:
+        own, line = diameters.get(fiber.name), fiber.settings.line_of("steric")
+        if own is None:
+            of_fibers.add("contacts", False, Note(EXACT, "steric is off", line))
+        elif own != largest:
+            of_fibers.add("contact_diameter", quantity(own, "um"), Note(EXACT, "twice the radius of steric", line))
     stiffness = simul.number(("steric", 1), "steric_stiff_push", default=0.0)
     if stiffness > 0.0:
-        note = Note(NEAREST, "of each crossing; Cytosim's is of vertices") if of_fibers else Note(EXACT, "")
+        note = Note(NEAREST, "of each crossing; Cytosim's is of vertices") if touching else Note(EXACT, "")
         table.add("stiffness", quantity(stiffness, "pN/um"), note)
-    if len(set(radii.values())) > 1:
-        text = f"contacts of filaments that differ: {', '.join(f'{name} {own:g} um' for name, own in radii.items())}"
-        table.comment(Note(LEFT_OUT, text, simul.line_of("steric"), "contacts that differ between filaments"))
+    names = dict.fromkeys([*touching, *(own.property for own in bodies)])
+    keys = {name: translation.script.properties[name].settings.text("steric") for name in names}
+    if len(set(keys.values())) > 1:
+        text = f"keys of steric, of which all touch all: {', '.join(f'{name} {key}' for name, key in keys.items())}"
+        table.comment(Note(LEFT_OUT, text, simul.line_of("steric"), "contacts between some of those that have some"))
 
 
 def add_box(translation):

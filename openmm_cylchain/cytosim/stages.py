@@ -15,7 +15,7 @@ _ABSENT = {
 """What a table has while what it describes is not there."""
 _WITHOUT = {"speed": "0 um/s", "unbinding_force": "1e+06 pN", "stall_force": "1e+06 pN", "rest_length": "0 um"}
 _WITHOUT |= {"walks_backward": False, "same_filament": False, "propulsion": "0 pN", "side": "inside", "nodes": "all"}
-_WITHOUT |= {"whole": True}
+_WITHOUT |= {"whole": True, "contacts": True}
 """Values that say the same as none."""
 _NOT_COMPARED = ("duration", "longest", "name", "type", "seed", "platform")
 _PLACES = ("position", "inside", "direction", "orientation", "nodes", "tangents", "file", "start", "height", "normal")
@@ -57,6 +57,7 @@ def add_stages(document, later, runs, unbound, deleted, cuts):
         _complete(name, stages, document, later)
     _longest(stages, document)
     _name_all_held(stages, document)
+    _give_diameters(stages, document)
     for number, (own, duration, run) in enumerate(zip(stages, durations, runs)):
         table = document.table("[[stage]]", run.line)
         table.add("name", f"run {number + 1}")
@@ -191,6 +192,25 @@ def _name_all_held(stages, document):
             table.add("holds", stages[0]["wall"][index]["holds"], Note(EXACT, "all"))
 
 
+def _give_diameters(stages, document):
+    # Contacts of bodies alone have one for fibers that come later; and fibers that have a contact_diameter in a stage
+    # have one in all in which there is one for all.
+    there = (own["contacts"][0] for own in stages if "contacts" in own)
+    later = next((own["diameter"] for own in there if "diameter" in own), None)
+    for table in document.tables_called("[contacts]"):
+        if later is not None and table.value("diameter") is None:
+            table.add("diameter", later, Note(EXACT, "of fibers that come later"))
+            stages[0]["contacts"][0]["diameter"] = later
+    for name in ("filament", "nucleation"):
+        for index in range(len(stages[0].get(name, []))):
+            if not any("contact_diameter" in own[name][index] for own in stages):
+                continue
+            for own in stages:
+                diameter = own.get("contacts", [{}])[0].get("diameter")
+                if diameter is not None:
+                    own[name][index].setdefault("contact_diameter", diameter)
+
+
 def _add_changes(document, before, after, line, unbound):
     for name in dict.fromkeys((*before, *after)):
         if name in ("title", "stage"):
@@ -248,6 +268,9 @@ def _change(document, name, first, second, line):
         if name in CHANGES and key not in CHANGES[name] or key in STAYS.get(name, ()):
             _leave_out(document, f"another {key} of {name}", line, key)
         elif key in ("stall_force", "walks_backward") and "speed" not in second:
+            continue
+        elif key == "contact_diameter" and key not in second:
+            # Nothing touches anything then.
             continue
         elif key not in second:
             if key == "active":

@@ -22,7 +22,6 @@ from .simulation import (
     add_contacts,
     add_simulation,
     add_solvent,
-    contact_diameter,
     thermal_energy,
 )
 from .spaces import make_space
@@ -67,11 +66,10 @@ class Translation:
         # Places on filaments of linkers that begin there, by the names of singles and couples.
         self.attached = {}
         self.growings, self.made, self.filament_count, self.start_files = [], [], 0, {}
-        # The numbers of the tables of each New of fibers.
-        self.tables_of_fibers = []
+        # The numbers of the tables of each New of fibers; and all of their tables, each with the Property.
+        self.tables_of_fibers, self.tables_by_fiber = [], []
         self._spaces, self._type_names = {}, {}
         self.dimensions = self._find_dimensions(dimensions)
-        self.contact_diameter = contact_diameter(script)
         self.steps = max(1, script.steps)
         self.duration = script.duration if duration is None else duration
         self._path = stem, dimensions, folder

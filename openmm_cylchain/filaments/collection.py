@@ -1,6 +1,6 @@
 """What couplings, reporters and recommended steps see of a Filaments object, which stands above them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
 import openmm
@@ -8,6 +8,7 @@ import openmm
 from ..errors import InputError
 from ..mechanics.flow import Flow
 from ..mechanics.redistribution import ChainSet
+from ..units.quantities import whole_numbers
 from ..units.types import Indices, IntArray, Vectors
 from .attachments import Attachment
 from .body import PlacedBody
@@ -87,6 +88,19 @@ class FilamentCollection(Protocol):
     def chain_set(self, system: openmm.System) -> ChainSet: ...
 
     def in_context(self, context: openmm.Context) -> CollectionInContext: ...
+
+
+def held_numbers(numbers: Indices | None, count: int) -> Sequence[int]:
+    """Numbers of different ones of so many filaments, all if None; InputError for others."""
+    if numbers is None:
+        return range(count)
+    held = whole_numbers(numbers, 0, "numbers")
+    for index in held:
+        if index >= count:
+            raise InputError(f"Filament {index} does not exist; there are {count}.")
+    if len(set(held)) < len(held):
+        raise InputError(f"numbers must be those of different filaments, but are {list(held)}.")
+    return held
 
 
 def require_filaments(filaments: Any) -> None:

@@ -1,6 +1,6 @@
-"""Those of a collection of filaments that take part in what happens, as a collection of their own."""
+"""Those of a collection of filaments that take part in a coupling, as a collection of their own."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -13,11 +13,11 @@ from .filament import Filament
 
 
 class FilamentsThatTakePart:
-    """A FilamentCollection without the filaments that stand aside; ``numbers`` are those of the others."""
+    """A FilamentCollection of the filaments with some ``numbers``."""
 
-    def __init__(self, filaments: FilamentCollection) -> None:
+    def __init__(self, filaments: FilamentCollection, numbers: Iterable[int]) -> None:
         self._filaments = filaments
-        self.numbers = [number for number, own in enumerate(filaments) if own.takes_part]
+        self.numbers = list(numbers)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._filaments, name)
@@ -57,5 +57,5 @@ class FilamentsThatTakePart:
     @property
     def attachment_indices(self) -> IntArray:
         """Particles of their attachment points."""
-        own = [self._filaments[one.filament].takes_part for one in self._filaments.attachments]
-        return self._filaments.attachment_indices[np.array(own, dtype=bool)]
+        own = np.isin([one.filament for one in self._filaments.attachments], self.numbers)
+        return self._filaments.attachment_indices[own]

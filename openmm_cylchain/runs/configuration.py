@@ -136,7 +136,7 @@ class Configuration:
     @property
     def contacts_of_filaments(self):
         """Whether there are contacts that filaments may feel."""
-        return self.contacts is not None and bool(self.filaments)
+        return any(group.contact_diameter is not None for group in self.filaments)
 
     @property
     def relaxes(self):
@@ -220,6 +220,8 @@ def _staged(raw, read):
 
 def _configuration(raw, text, folder, lines):
     tables = _read_tables(raw)
+    if CONTACTS.name not in raw:
+        _refuse_contact_diameters(tables)
     title = Text().read(raw.get("title", ""), Place("title", ("title",)))
     (solvent,) = map(read_solvent, tables["solvent"])
     box = tables["box"][0]["edges"] if tables["box"] else None
@@ -246,7 +248,7 @@ def _configuration(raw, text, folder, lines):
         linkers,
         *([read_flow(own) for own in tables["flow"]] or (None,)),
         tuple(read_particles(own, solvent, box) for own in tables["particles"]),
-        *([read_contacts(own, groups) for own in tables["contacts"]] or (None,)),
+        *([read_contacts(own) for own in tables["contacts"]] or (None,)),
         walls,
         tuple(read_tether(own, groups) for own in tables["tether"]),
         tuple(read_pull(own, groups) for own in tables["pull"]),
@@ -304,6 +306,14 @@ def _read_tables(raw):
     return tables
 
 
+def _refuse_contact_diameters(tables):
+    for name in (FILAMENT.name, NUCLEATION.name, BRANCHING.name):
+        for entries in tables[name]:
+            entries.refuse(
+                ("contact_diameter",), "belongs to [contacts]: add that table, with active = false if it comes later."
+            )
+
+
 def _refuse_without_filaments(tables):
     # What names a filament is refused by its number.
     random = [entries for entries in tables["link"] if "within" in entries]
@@ -313,8 +323,9 @@ def _refuse_without_filaments(tables):
 
 def _filaments(tables, solvent, box, folder, monomers):
     groups, reserves = [], []
+    (contacts,) = tables["contacts"] or (None,)
     for number, entries in enumerate(tables["filament"], start=1):
-        own = read_filaments(entries, number, solvent, box, folder, monomers)
+        own = read_filaments(entries, number, solvent, box, folder, monomers, contacts)
         groups += own
         _check_nodes(entries, groups)
         reserves.append((entries, own))
@@ -323,11 +334,8 @@ def _filaments(tables, solvent, box, folder, monomers):
         groups += filter(None, [read_reserve(entries, own)])
         _check_nodes(entries, groups)
     for entries in tables["nucleation"]:
-        groups.append(read_nucleation(entries, groups, solvent, box, monomers))
+        groups.append(read_nucleation(entries, groups, solvent, box, monomers, contacts))
         _check_nodes(entries, groups)
-    (contacts,) = tables["contacts"] or (None,)
-    if contacts is not None and groups:
-        contacts.require("diameter")
     for entries in tables["branching"]:
         groups.append(read_branching(entries, groups, solvent, monomers, contacts))
         _check_nodes(entries, groups)
@@ -388,7 +396,7 @@ def _disturbed(configuration):
             "links": bool(linked & numbers) or any(link.between is None for link in configuration.links),
             "joints": bool(joined & numbers),
             "bodies": group.on_body,
-            "contacts": configuration.contacts is not None,
+            "contacts": group.contact_diameter is not None,
             "walls": any(wall.holds(group.type) for wall in configuration.walls),
             "forces": bool(pulled & numbers),
             "frames": bool(framed & numbers) or (group.closed and has_twist(group.type)),

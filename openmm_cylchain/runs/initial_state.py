@@ -16,7 +16,6 @@ from ..couplings.pulling import constant_force, constant_tension
 from ..couplings.walls import filament_wall_force, wall_force
 from ..errors import InputError
 from ..filaments import shapes
-from ..filaments.filaments_that_take_part import FilamentsThatTakePart
 from ..filaments.monomers import Monomers
 from ..output.progress import LateMessages, ProgressMessages
 from ..systems.filaments import Filaments
@@ -75,23 +74,24 @@ def build_system(configuration, engine, seed, kinetics=True, begun=None, deleted
     filaments = place_filaments(configuration, engine, seed, kinetics, begun, deleted)
     topology, system, positions = filaments.build(box_vectors(configuration.box))
     positions, spheres, radii, friction = _add_particles(configuration, seed, topology, system, positions)
-    present = filaments if all(own.takes_part for own in filaments) else FilamentsThatTakePart(filaments)
     in_contact = [group for group in configuration.bodies if group.contacts]
     touching, touching_radii = spheres_of_bodies(configuration, filaments, in_contact)
     count = add_links(configuration, filaments, system, seed)
     add_joints(configuration, filaments, system)
     tables = configuration.tables
-    if configuration.contacts is not None and (len(present) or len(spheres) + len(touching) > 1):
+    diameters = contact_diameters(configuration, filaments)
+    if diameters or (configuration.contacts is not None and len(spheres) + len(touching) > 1):
         own = configuration.contacts
         with tables["contacts"][0].naming():
             force = capsule_contact_force(
-                present,
+                filaments,
                 system,
-                own.diameter,
+                list(diameters.values()) if diameters else None,
                 own.stiffness,
                 [*spheres, *touching],
                 2.0 * np.concatenate([radii, touching_radii]) if spheres or touching else None,
                 own.excluded_neighbors,
+                numbers=list(diameters),
             )
         system.addForce(force)
     names = [own.name for own in configuration.particles for _ in range(own.count)]
@@ -104,11 +104,21 @@ def build_system(configuration, engine, seed, kinetics=True, begun=None, deleted
         enclosed, enclosed_radii = spheres_of_bodies(configuration, filaments, bodies, most)
         every = [*(spheres[number] for number in held), *enclosed], np.concatenate([radii[held], enclosed_radii])
         with entries.naming():
-            system.addForce(_wall(own, present, system, *every))
+            system.addForce(_wall(own, filaments, system, *every))
     for own, entries in zip(configuration.pulls, tables["pull"]):
         with entries.naming():
             system.addForce(_pull(own, filaments))
     return BuiltSystem(filaments, topology, system, positions, friction, configuration.flow, count, deleted)
+
+
+def contact_diameters(configuration, filaments):
+    """Those of filaments that are there and may touch others, in nm by their numbers."""
+    every = (group.contact_diameter for group in configuration.filaments for _ in range(group.count))
+    return {
+        number: diameter
+        for number, (own, diameter) in enumerate(zip(filaments, every))
+        if own.takes_part and diameter is not None
+    }
 
 
 def stands_alone(configuration):
@@ -172,7 +182,7 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None, dele
     filaments = Filaments(solvent.viscosity, solvent.temperature, engine)
     on_bodies = add_bodies(configuration, filaments, seed)
     centers = _grid_centers(configuration.filaments, solvent.temperature) if box is None else None
-    planar = None if configuration.contacts is None else PlanarSegments(box_vectors(box))
+    planar = PlanarSegments(box_vectors(box))
     messages = ProgressMessages()
     progress = LateMessages(
         messages,
@@ -191,23 +201,22 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None, dele
                 _add(filaments, group, begun[number].positions, begun[number].control_points, kinetics)
                 continue
             places = np.random.default_rng([seed, number, 1])
+            crossed = planar if group.planar and group.contact_diameter is not None else None
             own = group, index, solvent.temperature, seed, number, places, box, centers
             if group.on_body:
                 nodes, control_points = _on_body(group, *on_bodies[number], f"Filament {number}")
             else:
-                nodes, control_points = _nodes(*own, planar if group.planar else None)
-            if planar is not None and group.planar:
-                planar.add(number, nodes, group.closed)
+                nodes, control_points = _nodes(*own, crossed)
+            if crossed is not None:
+                crossed.add(number, nodes, group.closed)
             _add(filaments, group, nodes, control_points, kinetics)
         for number in range(first, len(filaments)):
             if not group.active or (number in deleted and group.growth is None):
                 filaments.set_aside(number)
+            if group.contact_diameter is not None and not group.type.segment_kind.straight:
+                spacing = contact_spacing(group.type, group.contact_diameter, solvent.temperature)
+                filaments.add_beads(number, spacing)
     messages.finish()
-    if configuration.contacts is not None:
-        for number, filament in enumerate(filaments):
-            if not filament.type.segment_kind.straight:
-                diameter = configuration.contacts.diameter
-                filaments.add_beads(number, contact_spacing(filament.type, diameter, solvent.temperature))
     for own, entries in zip(configuration.tethers, configuration.tables["tether"]):
         with entries.naming():
             for number in own.filaments:
@@ -445,7 +454,7 @@ def _add_particles(configuration, seed, topology, system, positions):
 
 
 def _wall(own, filaments, system, spheres, radii):
-    numbers = [number for number, filament in enumerate(filaments) if own.holds(filament.type)]
+    numbers = [number for number, filament in enumerate(filaments) if filament.takes_part and own.holds(filament.type)]
     if filaments.engine == "compiled":
         radii = radii * own.whole
         for radius in radii:

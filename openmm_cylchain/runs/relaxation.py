@@ -10,12 +10,13 @@ from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..couplings.contact_frames import find_contacts
 from ..couplings.planar_crossings import find_planar_crossing
 from ..errors import InputError, InstabilityError
+from ..filaments.filaments_that_take_part import FilamentsThatTakePart
 from ..kinetics.binding_force import find_binding_force, place_linkers
 from ..output.progress import LateMessages, ProgressMessages
 from ..systems.refused_context import refusal
 from ..time_steps.coupled_step import mobilities, mobilities_of_ends
 from ..units.quantities import thermal_energy
-from .initial_state import box_vectors, build_system
+from .initial_state import box_vectors, build_system, contact_diameters
 
 _COLD_TEMPERATURE = 1.0
 _MOST_PUSHES, _LOOKED_AT, _JUDGED = 2000, 10, 100
@@ -125,7 +126,8 @@ def _come_apart(configuration, positions, progress, stop, begun, deleted=frozens
     stop = stop or (lambda: None)
     settings, temperature = configuration.simulation, configuration.solvent.temperature
     alone = build_system(configuration, settings.engine, settings.seed, kinetics=False, begun=begun, deleted=deleted)
-    _refuse_if_full(configuration, alone.filaments)
+    diameters = contact_diameters(configuration, alone.filaments)
+    _refuse_if_full(configuration, alone.filaments, diameters)
     recommended = alone.filaments.recommended_time_step(settings.scheme, system=alone.system, **alone.arguments())
     longest = min(settings.time_step, recommended.step)
     integrator = alone.filaments.create_integrator(
@@ -138,7 +140,7 @@ def _come_apart(configuration, positions, progress, stop, begun, deleted=frozens
         **alone.arguments(),
     )
     box = None if configuration.box is None else box_vectors(configuration.box)
-    pushes = _Pushes(alone, temperature, longest, max(settings.time_step, recommended.step), box)
+    pushes = _Pushes(alone, diameters, temperature, longest, max(settings.time_step, recommended.step), box)
     reference = Platform.getPlatform("Reference")
     try:
         context = Context(alone.system, integrator, reference)
@@ -170,17 +172,18 @@ def _come_apart(configuration, positions, progress, stop, begun, deleted=frozens
                     f"[contacts] filaments that overlap at first have not come apart: {error} Begin with fewer "
                     "filaments, with a smaller diameter or time_step, or set relax = false."
                 ) from None
-        positions = _shifted(positions, alone.filaments, number, configuration.contacts.diameter, settings.seed, shift)
+        diameter = diameters.get(number, alone.filaments[number].type.diameter)
+        positions = _shifted(positions, alone.filaments, number, diameter, settings.seed, shift)
     return positions
 
 
 class _Pushes:
     # Steps in which contacts push with the forces of the start: that they are many or deep costs no more.
 
-    def __init__(self, alone, temperature, resolving, longest, box):
+    def __init__(self, alone, numbers, temperature, resolving, longest, box):
         self._temperature, self._box = temperature or _COLD_TEMPERATURE, box
         self._resolving, self._longest = resolving, longest
-        self._filaments = alone.filaments
+        self._touching = FilamentsThatTakePart(alone.filaments, numbers)
         forces = [as_capsule_contact_force(own) for own in alone.system.getForces()]
         self._forces = [own for own in forces if own is not None]
         self._smallest, self._mobilities = math.inf, []
@@ -202,7 +205,7 @@ class _Pushes:
         """Take steps until contacts are shallow, or more would bring little."""
         begun = _positions(context)
         integrator.setTemperature(_COLD_TEMPERATURE)
-        if find_planar_crossing(self._filaments, self._box, begun) is not None:
+        if find_planar_crossing(self._touching, self._box, begun) is not None:
             _take_steps(integrator, step, [length * self._resolving for length in _COLD])
             return
         integrator.setExplicitForceGroups(1 << _EXPLICIT_GROUP)
@@ -236,12 +239,13 @@ class _Pushes:
 
     def _refuse_planar_crossings(self, pushed):
         # The equations of later steps would keep them.
-        found = find_planar_crossing(self._filaments, self._box, pushed)
+        found = find_planar_crossing(self._touching, self._box, pushed)
         if found is None:
             return
-        number, other = found.filament, found.other_filament
+        number, other = (self._touching.numbers[one] for one in (found.filament, found.other_filament))
+        kind = self._touching[found.other_filament].type
         raise InstabilityError(
-            f"Filament {other} ({self._filaments[other].type.name}) would be pushed through filament {number}.",
+            f"Filament {other} ({kind.name}) would be pushed through filament {number}.",
             filament=other,
             segment=found.other_segment,
         )
@@ -272,20 +276,19 @@ def _fastest(contacts, mobilities):
     return float((of_capsules[which] * both).sum(axis=1).max())
 
 
-def _refuse_if_full(configuration, filaments):
-    diameter = configuration.contacts.diameter
-    if configuration.box is None or diameter is None:
-        # Of bodies alone.
+def _refuse_if_full(configuration, filaments, diameters):
+    if configuration.box is None or not diameters:
         return
-    there = [own for own in filaments if own.takes_part]
-    length = sum(float(np.linalg.norm(np.diff(own.positions, axis=0), axis=1).sum()) for own in there)
-    share, most = length * math.pi * diameter**2 / 4.0 / math.prod(configuration.box), _FULLEST
+    there = [filaments[number] for number in diameters]
+    lengths = np.array([np.linalg.norm(np.diff(own.positions, axis=0), axis=1).sum() for own in there])
+    widths = np.array(list(diameters.values()))
+    share, most = (lengths * widths**2).sum() * math.pi / 4.0 / math.prod(configuration.box), _FULLEST
     if all(own.planar for own in there):
-        share, most = length * diameter / math.prod(configuration.box[:2]), 1.0
+        share, most = (lengths * widths).sum() / math.prod(configuration.box[:2]), 1.0
     if share > most:
         raise InputError(
-            f"[contacts] filaments with a diameter of {diameter:g} nm would fill {100 * share:.0f} % of the box, in "
-            "which they cannot come apart. Begin with fewer filaments or with a smaller diameter, or set relax = false."
+            f"[contacts] filaments of up to {widths.max():g} nm would fill {100 * share:.0f} % of the box, in which "
+            "they cannot come apart. Begin with fewer filaments or with a smaller diameter, or set relax = false."
         )
 
 

@@ -1,7 +1,6 @@
 """Lines of tables of forces, of all walls and contacts that there are in some stage of a run."""
 
 from ..couplings.force_reporters import rows_of_contacts, rows_of_walls
-from ..filaments.filaments_that_take_part import FilamentsThatTakePart
 
 _NONE = (0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -32,9 +31,4 @@ class RowsOfForces:
         rows = [(place, known.get(place, _NONE)) for place in self._faces]
         if not self.there[1]:
             return rows, ()
-        forces = [_NONE] * len(filaments)
-        if contacts:
-            present = FilamentsThatTakePart(filaments)
-            for number, row in zip(present.numbers, rows_of_contacts(contacts, present)):
-                forces[number] = row
-        return rows, forces
+        return rows, rows_of_contacts(contacts, filaments) if contacts else [_NONE] * len(filaments)

@@ -152,7 +152,7 @@ class AddedFilaments:
 
         So a filament comes, or goes, while an experiment goes on: in another System it takes part, and a Context of
         that goes on from one of this (``FilamentsInContext.go_on_from``). Contacts and walls are for the others if they
-        are given ``FilamentsThatTakePart(filaments)``.
+        are given the ``numbers`` of these.
 
         Parameters
         ----------

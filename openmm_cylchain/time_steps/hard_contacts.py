@@ -19,7 +19,7 @@ import numpy as np
 import openmm
 import scipy
 
-from ..couplings.capsule_contacts import as_capsule_contact_force
+from ..couplings.capsule_contacts import as_capsule_contact_force, owners_of_chains
 from ..errors import ContactWarning
 from ..filaments.collection import FilamentCollection
 from ..filaments.growth import segment_of_length
@@ -98,11 +98,7 @@ def warn_of_hard_contacts(
 def _chains_in_contact(filaments, contacts):
     # Type, segments, and whether it is closed, of each kind of filament; beam elements touch at beads. Short filaments
     # are softest: those that grow count as they are when they are shortest.
-    owners = {int(nodes[0]): filament for filament, nodes in zip(filaments, filaments.node_indices)}
-    for particle, attachment in zip(filaments.attachment_indices, filaments.attachments):
-        owners[int(particle)] = filaments[attachment.filament]
-    firsts = [contacts.getChainParticles(chain)[0] for chain in range(contacts.getNumChains())]
-    found = [owners[first] for first in firsts if first in owners]
+    found = [filaments[number] for number in owners_of_chains(contacts, filaments) if number >= 0]
     return set((*_at_its_shortest(filament), filament.closed) for filament in found)
 
 

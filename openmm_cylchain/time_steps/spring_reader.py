@@ -5,7 +5,7 @@ import re
 import numpy as np
 import openmm
 
-from ..couplings.capsule_contacts import as_capsule_contact_force
+from ..couplings.capsule_contacts import as_capsule_contact_force, owners_of_chains
 from ..couplings.chain_forces import is_chain_force
 from ..couplings.contacts import CONTACT_STIFFNESS, is_contact_force
 from ..couplings.crosslinks import Crosslinks
@@ -168,6 +168,7 @@ class SpringReader:
         # One contact, at the node that moves most; and where filaments lie side by side, one for each segment.
         stiffness = force.getStiffness()._value
         chains = [np.array(force.getChainParticles(chain)) for chain in range(force.getNumChains())]
+        numbers = owners_of_chains(force, self._filaments)
         ends = [nodes[:1] if force.isChainClosed(chain) else nodes[[0, -1]] for chain, nodes in enumerate(chains)]
         springs = []
         # Of two filaments that touch, each moves.
@@ -175,7 +176,7 @@ class SpringReader:
             ("end of filament", ends, ACCURATE),
             ("all along filament", chains, ACCURATE_ALONG_CONTACT),
         ):
-            owners = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+            owners = np.repeat(numbers, [len(part) for part in parts])
             nodes = np.concatenate([np.zeros(0, dtype=int), *parts])
             nowhere, both = np.full(len(nodes), NOWHERE), np.full(len(nodes), 2.0 * stiffness)
             springs.append(Springs(label, item, owners, nodes, nowhere, both, accurate))

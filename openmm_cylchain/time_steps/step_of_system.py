@@ -4,7 +4,7 @@ from collections import Counter
 
 import openmm
 
-from ..couplings.capsule_contacts import as_capsule_contact_force
+from ..couplings.capsule_contacts import as_capsule_contact_force, owners_of_chains
 from ..couplings.contacts import default_stiffness, filament_diameters, is_contact_force
 from ..errors import InputError
 from ..filaments.attachments import BEAD_NAME
@@ -108,11 +108,10 @@ def _steps_of_diffusion(filaments, system, temperature, confidence, scheme, coup
     for index, force in enumerate(system.getForces()):
         capsules = as_capsule_contact_force(force)
         if capsules is not None and not (scheme in IMPLICIT_SCHEMES and coupled.includes(index)):
-            owners = {int(nodes[0]): filament for filament, nodes in zip(filaments, filaments.node_indices)}
-            for chain in range(capsules.getNumChains()):
-                filament = owners.get(capsules.getChainParticles(chain)[0])
-                if filament is not None:
-                    found[filament.type, filament.segments, capsules.getChainDiameter(chain)._value] = True
+            for chain, number in enumerate(owners_of_chains(capsules, filaments)):
+                if number >= 0:
+                    kind, segments = filaments[number].type, filaments[number].segments
+                    found[kind, segments, capsules.getChainDiameter(chain)._value] = True
         if is_contact_force(force):
             for filament, beads in zip(filaments, filaments.bead_indices):
                 diameter = force.getParticleParameters(int(beads[0]))[0] if len(beads) else 0.0

@@ -12,7 +12,11 @@ from openmm import app, unit
 
 from openmm_cylchain import F_ACTIN, ContactWarning, Filaments, InputError, capsule_contact_force, engine_choice
 from openmm_cylchain.analysis import CrossingCounter
-from openmm_cylchain.couplings.capsule_contacts import as_capsule_contact_force, default_capsule_stiffness
+from openmm_cylchain.couplings.capsule_contacts import (
+    as_capsule_contact_force,
+    default_capsule_stiffness,
+    owners_of_chains,
+)
 from openmm_cylchain.couplings.contacts import contact_force
 from openmm_cylchain.engines.compiled import plugin
 from openmm_cylchain.time_steps.explicit_forces import ExplicitForces
@@ -452,6 +456,19 @@ def test_low_barriers_are_warned_of(stiffness, warns):
     assert not warns or "for 24 k_B T" in str(record[0].message)
 
 
+def test_messages_have_the_numbers_of_filaments():
+    """Of those that take part: in warnings and in recommended steps."""
+    filaments, _, system, _ = _filaments(*(([0, 0, 60 * own], [1, 0, 0]) for own in range(3)))
+    with pytest.warns(ContactWarning, match="Filament 2 has a contact diameter of 10 nm"):
+        force = capsule_contact_force(filaments, system, [10, 30], 1.0, numbers=[2, 1])
+    assert [force.getChainDiameter(chain)._value for chain in (0, 1)] == [10.0, 30.0]
+    assert list(owners_of_chains(force, filaments)) == [2, 1]
+    system.addForce(force)
+    allowed = filaments.recommended_time_step("midpoint", system=system).allowed
+    numbers = {name.rsplit(" ", 1)[1] for name in allowed if ": end of filament" in name}
+    assert numbers and numbers <= {"1", "2"}
+
+
 def test_default_stiffness_makes_a_barrier_of_forty():
     filaments, _, system, positions = _filaments(([0, 150, 0], [1, 0, 0]), ([150, 0, 1e-6], [0, 1, 0]))
     force = capsule_contact_force(filaments, system, [DIAMETER, 50])
@@ -482,6 +499,13 @@ def test_bad_input_is_refused(monkeypatch):
         (lambda: capsule_contact_force(filaments, system, None), "diameter must be a number .* but is None"),
         (lambda: capsule_contact_force(filaments, system, 1e20), "1e.20 nm is none of filaments"),
         (lambda: capsule_contact_force(filaments, system, 1e-20), "1e-20 nm is none of filaments"),
+        (lambda: capsule_contact_force(filaments, system, [30, 30], numbers=[1]), "must be a number or have 1 entries"),
+        (
+            lambda: capsule_contact_force(filaments, system, 30, numbers=[0, 2]),
+            "Filament 2 does not exist; there are 2",
+        ),
+        (lambda: capsule_contact_force(filaments, system, 30, numbers=[1, 1]), "those of different filaments"),
+        (lambda: capsule_contact_force(filaments, system, numbers=[]), "no filaments that could touch"),
         (lambda: capsule_contact_force(cold, cold_system, 30), "needs a stiffness"),
         (lambda: capsule_contact_force(narrow, narrow_system, 30), "255 nm wide .* need 260 nm"),
     ):

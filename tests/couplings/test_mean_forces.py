@@ -321,6 +321,26 @@ def test_forces_do_not_depend_on_threads():
             np.testing.assert_array_equal(one, two)
 
 
+def test_loads_are_those_of_the_filaments_that_contacts_have():
+    """Of the last two of three rods, which lie across each other, and of a bead on the last one."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    kind = F_ACTIN.with_segment_length(100.0)
+    for height, direction in ((2.0, [1, 1, 0]), (0.0, [1, 0, 0]), (8.0, [0, 1, 0])):
+        filaments.add_straight(kind, 1, start=[-50.0 * own for own in direction[:2]] + [height], direction=direction)
+    _, system, positions = filaments.build()
+    bead = system.addParticle(1.0)
+    positions = np.concatenate([positions._value, [[0.0, 30.0, 13.0]]])
+    arguments = {"particles": [bead], "particle_diameter": 10.0, "numbers": [2, 1]}
+    system.addForce(capsule_contact_force(filaments, system, [12.0, 10.0], 3.0, **arguments))
+    integrator = filaments.create_integrator(system, 1.0, particle_friction=[1.0], checks=False)
+    found = contact_forces(new_context(system, positions, integrator, "CPU"))[0]
+    # Their gap is 8 - 11 nm; that of the bead 5 - 11 nm.
+    assert sorted(map(tuple, found.pairs)) == [(0, 1), (0, 2)]
+    assert found.loads_of_filaments(filaments)._value == pytest.approx([0.0, 9.0, 27.0])
+    forces = found.on_filaments(filaments)._value
+    assert not forces[0].any() and forces[1, 2] == pytest.approx(-9.0) and forces[2, 2] == pytest.approx(-9.0)
+
+
 def test_filaments_of_another_system_are_refused():
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     filaments.add_straight(F_ACTIN.with_segment_length(100), 1, [0, 0, 0], [1, 0, 0])

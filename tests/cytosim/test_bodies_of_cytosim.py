@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from openmm_cylchain import InputError
+from openmm_cylchain.couplings.capsule_contacts import as_capsule_contact_force
 from openmm_cylchain.cytosim.command import import_file
 from openmm_cylchain.cytosim.translation import translate
 from openmm_cylchain.runs.configuration import read_configuration
@@ -129,24 +130,29 @@ def test_ends_of_fibers_that_touch_each_other_are_apart(tmp_path):
 
 
 def test_bodies_push_each_other_where_steric_is_on(tmp_path):
-    """With the stiffness of steric, at the sum of their radii; fibers without steric would be pushed, too."""
+    """With the stiffness of steric, at the sum of their radii, and beside fibers that nothing touches."""
     head = HEAD.replace("set simul system {", "set simul system { steric = 1, 100;")
     beads = "set bead ball { steric = 1 }\nset bead ghost { steric = 0 }\nnew 3 ball { radius = 1 }\n"
     beads += "new 2 ghost { radius = 0.5 }\n"
     found, document = translated(tmp_path, beads, head.replace("set fiber tube {", "set bead tube {"))
     assert document.missing == []
-    assert found.contacts.diameter is None and found.contacts.stiffness == pytest.approx(100 * PN_PER_UM)
+    assert found.contacts.stiffness == pytest.approx(100 * PN_PER_UM)
     assert [own.contacts for own in found.bodies] == [True, False]
     built = build_system(found, None, 1)
     assert "CylinderChainContactForce" in [force.getName() for force in built.system.getForces()]
-    found, document = translated(tmp_path, beads, head)
-    assert found.contacts is None and document.missing == ["contacts that differ between filaments"]
+    found, document = translated(tmp_path, beads + "new 2 tube { length = 1 }\n", head)
+    assert document.missing == [] and found.filaments[0].contact_diameter is None
+    built = build_system(found, None, 1)
+    (force,) = filter(None, map(as_capsule_contact_force, built.system.getForces()))
+    assert (force.getNumChains(), force.getNumSpheres()) == (0, 3)
     touching = head.replace("rigidity = 20;", "rigidity = 20; steric = 1, 0.05;").replace(
         "confine = inside, 100 }\nset aster", "steric = 1 }\nset aster"
     )
     text = "new star { solid = core; radius = 0.6; fibers = 4, tube, ( length = 2; ) }\n"
     found, document = translated(tmp_path, text, touching)
     assert not found.bodies[0].contacts and document.missing == ["contacts of bodies that hold fibers"]
+    found, document = translated(tmp_path, text, touching.replace("; steric = 1, 0.05", ""))
+    assert found.bodies[0].contacts and document.missing == []
 
 
 def test_solids_have_points_radii_and_singles(tmp_path):

@@ -424,6 +424,32 @@ def test_events_begin_fibers(tmp_path):
     assert document.missing == []
 
 
+def test_contacts_of_fibers_are_those_of_their_properties(tmp_path):
+    system = SYSTEM.replace("dim = 3", "dim = 3; steric = 1, 500")
+    fibers = "".join(
+        f"set fiber {name} {{ rigidity = 20; steric = {steric} }}\nnew 3 {name} {{ length = 2 }}\n"
+        for name, steric in (("thin", "1, 0.015"), ("thick", "1, 0.02"), ("none", "0"), ("thick2", "1, 0.02"))
+    )
+    found, document = translated(tmp_path, fibers, system)
+    assert [own.contact_diameter for own in found.filaments] == [30, 40, None, 40]
+    assert document.missing == []
+    text = document.text()
+    assert text.count("contact_diameter") == text.count("contacts = false") == 1
+    # Keys of steric say which of them touch each other, where Cytosim is built for several.
+    _, document = translated(tmp_path, fibers.replace("1, 0.015", "2, 0.015"), system)
+    assert document.missing == ["contacts between some of those that have some"]
+    assert "thin 2, thick 1, thick2 1" in document.text()
+    # Without steric of the system there are none, and in a later run they are others.
+    found, _ = translated(tmp_path, fibers)
+    assert found.contacts is None and [own.contact_diameter for own in found.filaments] == [None] * 4
+    change = "run 100 system\nchange thin { steric = 1, 0.02 }\nchange none { steric = 1, 0.014 }\n"
+    change += "run 100 system\nchange system { steric = 0 }\n"
+    found, document = translated(tmp_path, fibers + change, system)
+    diameters = [[own.contact_diameter for own in stage.configuration.filaments] for stage in found.stages]
+    assert diameters == [[30, 40, None, 40], [40, 40, 28, 40], [None] * 4]
+    assert document.missing == []
+
+
 def test_walls_contacts_and_boxes(tmp_path):
     system = SYSTEM.replace("dim = 3", "dim = 3; steric = 1, 500")
     own = "set fiber tube { rigidity = 20; confine = inside, 200; steric = 1, 0.01 }\nnew 3 tube { length = 2 }\n"
@@ -432,7 +458,7 @@ def test_walls_contacts_and_boxes(tmp_path):
     stiffness = unit.piconewton / unit.micrometer * unit.AVOGADRO_CONSTANT_NA
     assert wall.stiffness == pytest.approx((200 * stiffness).value_in_unit(STIFFNESS))
     assert wall.shape.radius == 4000
-    assert found.contacts.diameter == 20
+    assert found.filaments[0].contact_diameter == 20
     assert found.contacts.stiffness == pytest.approx((500 * stiffness).value_in_unit(STIFFNESS))
     assert document.missing == []
     periodic = "set space cell { shape = periodic }\nnew cell { length = 5, 6, 7 }\n"

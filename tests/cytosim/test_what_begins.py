@@ -282,7 +282,7 @@ def test_contacts_with_which_no_step_can_be_taken_are_turned_off(tmp_path, monke
     # They can be turned on again.
     assert output.read_text().count("active = false") == 1
     output.write_text(output.read_text().replace("active = false", "active = true"))
-    assert stages_of(read_configuration(output))[-1].configuration.contacts.diameter == 40
+    assert stages_of(read_configuration(output))[-1].configuration.filaments[0].contact_diameter == 40
 
 
 def test_first_steps_of_beads_in_a_periodic_space(tmp_path):
@@ -292,7 +292,8 @@ def test_first_steps_of_beads_in_a_periodic_space(tmp_path):
     path.write_text(text)
     said = import_file(path, tmp_path / "my.toml", trial=True)
     assert "  left out: nothing" in said
-    assert read_configuration(tmp_path / "my.toml").contacts.diameter is None
+    found = read_configuration(tmp_path / "my.toml")
+    assert found.contacts is not None and found.filaments == ()
 
 
 def test_what_there_was_no_time_to_try_is_said(tmp_path, monkeypatch):

@@ -30,7 +30,8 @@ CONTACTS = TableKind(
             "diameter",
             Quantity(units.LENGTH),
             None,
-            "Distance of two axes at which filaments touch; needed where there are some.",
+            "Distance of two axes at which filaments touch that have no contact_diameter of their own. Two that differ "
+            "touch at the mean.",
         ),
         Key(
             "stiffness",
@@ -51,9 +52,6 @@ CONTACTS = TableKind(
     "Filaments do not pass through each other: their segments are capsules, see `capsule_contact_force`. [[particles]] "
     "and [[body]] take part as spheres, which push each other, too, but not those of one body.",
 )
-
-# Of the diameter of filaments. Steps would have to be divided again and again to resolve contacts of less.
-_LEAST_DIAMETER = 0.1
 
 NUMBERS = Either(
     (
@@ -178,9 +176,8 @@ LINK = TableKind(
 
 @dataclass(frozen=True)
 class Contacts:
-    """The [contacts] table; lengths in nm."""
+    """The [contacts] table, but for diameters, which FilamentGroups have."""
 
-    diameter: float | None
     stiffness: float | None
     excluded_neighbors: int | None
     relax: bool
@@ -239,15 +236,9 @@ class LinkGroup:
     label: str
 
 
-def read_contacts(entries, groups):
-    """The Contacts of a [contacts] table, for FilamentGroups."""
-    thinnest = min((group.type.diameter for group in groups), default=0.0)
-    if groups and entries["diameter"] < _LEAST_DIAMETER * thinnest:
-        raise entries.at("diameter").error(
-            f"is {entries['diameter']:g} nm, but filaments are {thinnest:g} nm thick: they touch at their diameter, or "
-            "further apart."
-        )
-    return Contacts(*(entries[name] for name in ("diameter", "stiffness", "excluded_neighbors", "relax")))
+def read_contacts(entries):
+    """The Contacts of a [contacts] table."""
+    return Contacts(*(entries[name] for name in ("stiffness", "excluded_neighbors", "relax")))
 
 
 def read_tether(entries, groups):

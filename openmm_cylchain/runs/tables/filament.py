@@ -25,6 +25,11 @@ RESERVE = "reserve"
 MOST_NODES = 10**7
 """Of a configuration: more than that would not fit into the memory of a computer of today."""
 
+SHARED = ("planar", "propulsion", "height", "table", "contact_diameter")
+"""What filaments that begin later have of a FilamentGroup of their table, beside their type and their growth."""
+
+# Of the diameter of filaments. Steps would have to be divided again and again to resolve contacts of less.
+_LEAST_DIAMETER = 0.1
 _ORIENTATIONS = ("polar", "nematic")
 _SEGMENTS = Whole(1, MOST_NODES, "64")
 _FROM_NODES = (
@@ -42,6 +47,17 @@ _FROM_NODES = (
     "height",
 )
 _FROM_FILE = (*_FROM_NODES[:-1], "tangents")
+
+CONTACT_KEYS = (
+    Key(
+        "contact_diameter",
+        Quantity(units.LENGTH),
+        None,
+        "Distance of two axes at which these filaments touch, with [contacts], if it is not the diameter there.",
+    ),
+    Key("contacts", Flag("false"), True, "Whether others touch them, with [contacts]."),
+)
+"""Of a table that makes filaments of its own."""
 
 FILAMENT = TableKind(
     "filament",
@@ -132,6 +148,7 @@ FILAMENT = TableKind(
             None,
             "How many places there are for parts of filaments that are cut, with growth = { severing_rate = ... }.",
         ),
+        *CONTACT_KEYS,
         ACTIVE,
         Key("delete", Inline(DELETE, DELETE_EXAMPLE), None, "In a `[[stage]]`: filaments that go as it begins."),
         Key(
@@ -165,7 +182,8 @@ class FilamentGroup:
     ``disturbed`` is what makes them no free chains, in words: links, walls and so on; ``tension`` that of their ends in
     kJ/(mol nm), with its direction, if nothing else is. ``positions`` are those of a file, or given ones, for each
     filament, and ``control_points`` those of beam elements or None. Those that grow have ``spare_nodes`` each;
-    ``on_body`` says whether bodies hold them, which know where they are.
+    ``on_body`` says whether bodies hold them, which know where they are. Without a ``contact_diameter`` nothing touches
+    them.
     """
 
     type: ChainType
@@ -196,6 +214,7 @@ class FilamentGroup:
     cuts: tuple = ()
     nucleation: Nucleation | None = dataclasses.field(default=None, compare=False)
     on_body: bool = False
+    contact_diameter: float | None = None
 
     @property
     def path(self):
@@ -229,10 +248,11 @@ class FilamentGroup:
         return "linkers" in self.disturbed
 
 
-def read_filaments(entries, table, solvent, box, folder, monomers):
+def read_filaments(entries, table, solvent, box, folder, monomers, contacts):
     """The FilamentGroups of a [[filament]] table, one for each length, for MonomerGroups.
 
-    The number of the table is counted from 1; files are named from the folder.
+    The number of the table is counted from 1; files are named from the folder. ``contacts`` are the Entries of
+    [contacts], or None.
     """
     kind = read_filament_type(entries, solvent)
     _check_element(entries, kind)
@@ -243,6 +263,7 @@ def read_filaments(entries, table, solvent, box, folder, monomers):
     growth = None if entries["growth"] is None else read_growth(entries["growth"], monomers)
     own = {"planar": True} if entries["planar"] else {}
     common = {key: entries[key] for key in ("propulsion", "height", "active")} | {"table": table}
+    common["contact_diameter"] = read_contact_diameter(entries, kind, contacts)
     if entries["delete"] is not None:
         common["delete"] = read_deletion(entries["delete"])
     common["cuts"] = read_cuts(entries["cut"])
@@ -269,6 +290,24 @@ def read_filaments(entries, table, solvent, box, folder, monomers):
     return finished
 
 
+def read_contact_diameter(entries, kind, contacts):
+    """The distance in nm at which filaments of a ChainType that a table makes touch, or None if nothing touches them.
+
+    ``contacts`` are the Entries of [contacts], or None.
+    """
+    if contacts is None or entries["contacts"] is False:
+        return None
+    own = entries if "contact_diameter" in entries else contacts
+    key = "contact_diameter" if own is entries else "diameter"
+    own.require(key)
+    if own[key] < _LEAST_DIAMETER * kind.diameter:
+        raise own.at(key).error(
+            f"is {own[key]:g} nm, but filaments are {kind.diameter:g} nm thick ({entries.label.rstrip(':')}): they "
+            "touch at their diameter, or further apart."
+        )
+    return own[key]
+
+
 def reserve_group(entries, kind, growth, count, **others):
     """The FilamentGroup of a table for filaments of a type that are not there yet: a count of places."""
     nodes = _spare_nodes(entries, growth, kind)
@@ -282,7 +321,7 @@ def read_reserve(entries, groups):
     if entries["reserve"] is None:
         return None
     first = groups[0]
-    own = {"planar": first.planar, "propulsion": first.propulsion, "height": first.height, "table": first.table}
+    own = {key: getattr(first, key) for key in SHARED}
     return reserve_group(entries, first.type, first.growth, entries["reserve"], **own)
 
 

@@ -8,7 +8,7 @@ from ...kinetics.nucleation import Nucleation
 from ...units import quantities as units
 from ..keys import REQUIRED, Flag, Inline, Key, Listing, Quantity, Whole, direction
 from ..table import TableKind
-from .filament import MOST_NODES, reserve_group
+from .filament import CONTACT_KEYS, MOST_NODES, SHARED, read_contact_diameter, reserve_group
 from .filament_types import TYPE_KEYS, read_filament_type
 from .growth import GROWTH, GROWTH_EXAMPLE, read_growth
 from .shapes import REGION, REGION_EXAMPLE, Region
@@ -40,7 +40,10 @@ _OWN_TYPE = (
     Key("growth", Inline(GROWTH, GROWTH_EXAMPLE), None, "Without a table: as of [[filament]]."),
     Key("propulsion", Quantity(units.FORCE, "any"), None, "Without a table: as of [[filament]]."),
     Key("planar", Flag(), None, "Without a table: whether each moves in a plane of constant z."),
-    *(dataclasses.replace(key, text=f"Without a table. {key.text}") for key in TYPE_KEYS),
+    *(
+        dataclasses.replace(key, default=None, text=f"Without a table. {key.text}")
+        for key in (*CONTACT_KEYS, *TYPE_KEYS)
+    ),
 )
 _BORROWED = tuple(key.name for key in _OWN_TYPE)
 
@@ -100,7 +103,8 @@ BRANCHING = TableKind(
             "distance",
             Quantity(units.LENGTH, "zero"),
             None,
-            "From the axis of the mother to the first node; with [contacts] their diameter, or zero, if not given.",
+            "From the axis of the mother to the first node. If not given: with [contacts] that at which the two touch, "
+            "the largest of different mothers; or zero.",
         ),
         Key("debranching_rate", Quantity(units.RATE, "zero"), None, "At which a branch lets go; never if not given."),
         Key("debranching_force", Quantity(units.FORCE), None, "Force that makes it let go e times as often."),
@@ -125,8 +129,11 @@ _OF_BRANCHES = (
 )
 
 
-def read_nucleation(entries, groups, solvent, box, monomers):
-    """The FilamentGroup of a [[nucleation]] table, for FilamentGroups of [[filament]] tables and MonomerGroups."""
+def read_nucleation(entries, groups, solvent, box, monomers, contacts):
+    """The FilamentGroup of a [[nucleation]] table, for FilamentGroups of [[filament]] tables and MonomerGroups.
+
+    ``contacts`` are the Entries of [contacts], or None.
+    """
     entries.only_one("rate", "total_rate")
     if not entries.given("rate", "total_rate"):
         entries.require("rate")
@@ -138,7 +145,7 @@ def read_nucleation(entries, groups, solvent, box, monomers):
         rate = entries["rate"] * units.RATE_PER_VOLUME
     with entries.naming():
         own = Nucleation(rate=rate, region=region, **entries.given("direction", *_SHARED))
-    return _group(entries, groups, solvent, monomers, own)
+    return _group(entries, own, *_which(entries, groups, solvent, monomers, contacts))
 
 
 def read_branching(entries, groups, solvent, monomers, contacts):
@@ -146,20 +153,32 @@ def read_branching(entries, groups, solvent, monomers, contacts):
 
     ``contacts`` are the Entries of [contacts], or None.
     """
+    which = _which(entries, groups, solvent, monomers, contacts)
+    mothers = _mothers(entries, groups)
     # Branches that begin within the contact of their mothers would not begin at all.
-    distance = {} if contacts is None else {"distance": contacts["diameter"]}
+    distance = _distance_of_contacts(mothers, groups, which[-1]["contact_diameter"])
     with entries.naming():
         own = Branching(
             rate=entries["rate"],
             region=_region(entries),
-            mothers=_mothers(entries, groups),
+            mothers=mothers,
             **{**distance, **entries.given(*_OF_BRANCHES, *_SHARED)},
         )
-    return _group(entries, groups, solvent, monomers, own)
+    return _group(entries, own, *which)
 
 
-def _group(entries, groups, solvent, monomers, nucleation):
-    kind, growth, others = _which(entries, groups, solvent, monomers)
+def _distance_of_contacts(mothers, groups, diameter):
+    # Branches may have branches, where no mothers are named.
+    owners = [group for group in groups for _ in range(group.count)]
+    others = [owners[number].contact_diameter for number in mothers or ()]
+    if mothers is None:
+        others = [diameter, *(group.contact_diameter for group in groups if group.growth is not None)]
+    if diameter is None:
+        return {}
+    return {"distance": max((0.5 * (diameter + own) for own in others if own is not None), default=0.0)}
+
+
+def _group(entries, nucleation, kind, growth, others):
     if nucleation.length is not None and nucleation.length > growth.longest:
         raise entries.at("length").error(f"must not exceed the longest of its growth, {growth.longest:g} nm.")
     direction = getattr(nucleation, "direction", None)
@@ -169,7 +188,7 @@ def _group(entries, groups, solvent, monomers, nucleation):
     return reserve_group(entries, kind, growth, entries["count"], nucleation=nucleation, own_path=path, **others)
 
 
-def _which(entries, groups, solvent, monomers):
+def _which(entries, groups, solvent, monomers, contacts):
     # Their type, their growth, and what else is that of their table.
     if "table" not in entries:
         if not entries.given(*_BORROWED):
@@ -177,6 +196,7 @@ def _which(entries, groups, solvent, monomers):
         kind = read_filament_type(entries, solvent)
         entries.require("growth")
         own = {"propulsion": entries["propulsion"] or 0.0, "planar": bool(entries["planar"]), "table": 0}
+        own["contact_diameter"] = read_contact_diameter(entries, kind, contacts)
         return kind, read_growth(entries["growth"], monomers), own
     entries.refuse(_BORROWED, "is that of the table whose number is given: leave one of them out.")
     found = [group for group in groups if group.path == ("filament", entries["table"] - 1)]
@@ -187,8 +207,7 @@ def _which(entries, groups, solvent, monomers):
         raise entries.at("table").error(
             f"is {entries['table']}, whose filaments do not grow: add to it a line such as growth = {GROWTH_EXAMPLE}"
         )
-    shared = {"propulsion": first.propulsion, "planar": first.planar, "height": first.height}
-    return first.type, first.growth, {**shared, "table": entries["table"]}
+    return first.type, first.growth, {key: getattr(first, key) for key in SHARED}
 
 
 def _region(entries):

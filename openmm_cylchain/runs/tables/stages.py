@@ -34,11 +34,11 @@ CHANGES = {
     ),
     "filament": (
         *("persistence_length", "bending_rigidity", "stretching_modulus", "stretching_stiffness", "propulsion"),
-        *("growth", "active", "delete", "cut"),
+        *("growth", "contact_diameter", "contacts", "active", "delete", "cut"),
     ),
     "monomers": ("plus_on_rate", "plus_off_rate", "minus_on_rate", "minus_off_rate", "aging", "concentration"),
-    "nucleation": ("rate", "total_rate", "direction", "inside"),
-    "branching": ("rate", "debranching_rate", "debranching_force", "inside"),
+    "nucleation": ("rate", "total_rate", "direction", "inside", "contact_diameter", "contacts"),
+    "branching": ("rate", "debranching_rate", "debranching_force", "inside", "contact_diameter", "contacts"),
     "particles": ("diameter", "friction", "diffusion"),
     "linkers": (
         *("hand", "hands", "stiffness", "rest_length", "same_filament", "count", "concentration", "volume", "bound"),
