@@ -25,6 +25,8 @@ _PER_UM3 = 602.214076
 _NO_FORCE = 1e6
 """In pN: a growing_force so large that loads change nothing."""
 _NEW_ENDS = "growth: states of new ends"
+_AT_ONCE = 10.0
+"""In a time step."""
 _EVERY_KEY = 2**32 - 1
 _MOST_LENGTH, _MANY_CATASTROPHES = 200.0, 20.0
 
@@ -71,8 +73,7 @@ def read_growth(translation, fiber, options):
             f"activity = {activity} of {settings.label}", settings.line_of("activity"), "growth: " + activity
         )
         return None
-    rebirth = settings.number("rebirth_rate", default=0.0) > 0.0
-    if all(state == _STILL for state in states.values()) and not rebirth:
+    if all(state == _STILL for state in states.values()):
         if cutting is None:
             text = f"{fiber.name}: both ends are static, so it keeps its length"
             translation.document.note(EXACT, text, options.line)
@@ -86,7 +87,7 @@ def read_growth(translation, fiber, options):
         return _of_still(translation, fiber, cutting)
     if cutting is not None:
         _add_cutting(translation, growing, cutting)
-    _add_ends(translation, growing, activity, rebirth)
+    _add_ends(translation, growing)
     return growing
 
 
@@ -203,6 +204,7 @@ def _turning(translation, growing, states, key):
         settings = growing.settings
         turns = _turning_rate(growing, key, end) > 0.0
         rescued = settings.number(("rescue_rate", _ENDS.index(end)), default=0.0) > 0.0
+        rescued = rescued or _rebirth(translation, settings, key, end)[0] > 0.0
         grows, shrinks = (states[end] == own for own in (_GROWING, _SHRINKING))
         if end == "minus" and not (grows and turns) and not (shrinks and rescued):
             _simple(translation, growing, states, end)
@@ -226,6 +228,9 @@ def _turn(translation, growing, state, key, end):
         ),
         "shrinking_off_rate": (quantity(shrinking / growing.monomer, "1/s"), shrinking_off),
     }
+    rebirth, note = _rebirth(translation, settings, key, end)
+    if rebirth > 0.0:
+        rates["renucleation_rate"] = quantity(rebirth + number_in(rates["rescue_rate"][0]), "1/s"), note
     _rate(growing, end, on, off)
     growing.turns = max(growing.turns, turning)
     if key == "catastrophe_rate":
@@ -261,6 +266,9 @@ def _from_shrinking(rates):
     if "catastrophe_length" in values:
         growing["switch_length"] = values["catastrophe_length"]
     shrinking = {"name": "shrinking", "on_rate": "0 1/(uM*s)", "off_rate": values["shrinking_off_rate"]}
+    if "renucleation_rate" in values:
+        more = number_in(values["renucleation_rate"]) - number_in(values["rescue_rate"])
+        shrinking["shortest_switch_rates"] = {"growing": quantity(more, "1/s")}
     return [shrinking | {"switch_rates": {"growing": values["rescue_rate"]}}, growing]
 
 
@@ -299,7 +307,7 @@ def _dynamic(translation, growing, states):
 _LAWS = {"grow": _grow, "treadmill": _grow, "classic": _classic, "dynamic": _dynamic}
 
 
-def _add_ends(translation, growing, activity, rebirth):
+def _add_ends(translation, growing):
     settings = growing.settings
     force = settings.number("growing_force", "dynamic_force", default=math.inf)
     if math.isfinite(force) and force > 0.0:
@@ -308,18 +316,30 @@ def _add_ends(translation, growing, activity, rebirth):
     else:
         note = Note(EXACT, "loads do not slow growth down; delete it for growth with an equilibrium")
         growing.entries.append(("growing_force", quantity(_NO_FORCE, "pN"), note))
-    stub = settings.number("delete_stub")
-    persistent = settings.flag("persistent", default=stub == 0.0 if stub is not None else False)
     shrinks = any(key.endswith(("off_rate", "_states")) for key, *_ in (*growing.rates, *growing.entries))
-    if shrinks and not persistent:
+    if shrinks and not _is_persistent(settings):
         note = Note(EXACT, "one of the shortest length is deleted (persistent = 0)", settings.line)
         growing.entries.append(("vanishes", True, note))
-    if rebirth and persistent:
-        translation.left_out(
-            f"{growing.name}: rebirth_rate of those that have shrunk",
-            settings.line_of("rebirth_rate"),
-            "growth: rebirth",
-        )
+
+
+def _is_persistent(settings):
+    # Whether fibers of the shortest length stay.
+    stub = settings.number("delete_stub")
+    return settings.flag("persistent", default=stub == 0.0 if stub is not None else False)
+
+
+def _rebirth(translation, settings, key, end):
+    # At which an end of a fiber that has shrunk to the shortest length grows again, in 1/s, and its Note.
+    line, step = settings.line_of("rebirth_rate"), translation.script.time_step
+    rate = settings.number(("rebirth_rate", _ENDS.index(end)), default=0.0)
+    has_none = end == "minus" and key == "hydrolysis_rate"
+    if rate <= 0.0 or has_none or not _is_persistent(settings):
+        return 0.0, None
+    if rate * step > _AT_ONCE:
+        return _AT_ONCE / step, Note(NEAREST, f"rebirth_rate = {rate:g}, at once", line)
+    if key == "hydrolysis_rate":
+        return rate, Note(NEAREST, "rebirth_rate, in Cytosim in steps alone in which a unit would come off", line)
+    return rate, Note(EXACT, "rebirth_rate", line)
 
 
 def longest_of(translation, growing, length):

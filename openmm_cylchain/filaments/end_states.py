@@ -64,6 +64,8 @@ class EndStates:
     switch_lengths : (n,) sequence of length, optional
         If not zero, the rates from this state to others are those of a filament of this length, and proportional to
         lengths.
+    shortest_switch_rates : (n, n) sequence of 1/time, optional
+        How much larger switch_rates are while the filament has its shortest length.
 
     The attributes hold plain numbers, in nm^3/ps, 1/ps and nm.
 
@@ -82,6 +84,7 @@ class EndStates:
     names: tuple[str, ...] = ()
     blocked_switch_rates: tuple[tuple[float, ...], ...] = ()
     switch_lengths: tuple[float, ...] = ()
+    shortest_switch_rates: tuple[tuple[float, ...], ...] = ()
 
     if TYPE_CHECKING:
 
@@ -96,6 +99,7 @@ class EndStates:
             names: Sequence[str] = (),
             blocked_switch_rates: Sequence[Sequence[Scalar]] = (),
             switch_lengths: Sequence[Scalar] = (),
+            shortest_switch_rates: Sequence[Sequence[Scalar]] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -114,9 +118,10 @@ class EndStates:
             self, "switch_lengths", tuple(non_negative(length, LENGTH, "switch_lengths") for length in lengths)
         )
         self._read_switches("switch_rates", count)
-        if not len(as_tuple(self.blocked_switch_rates, "blocked_switch_rates")):
-            object.__setattr__(self, "blocked_switch_rates", ((0.0,) * count,) * count)
-        self._read_switches("blocked_switch_rates", count)
+        for name in ("blocked_switch_rates", "shortest_switch_rates"):
+            if not len(as_tuple(getattr(self, name), name)):
+                object.__setattr__(self, name, ((0.0,) * count,) * count)
+            self._read_switches(name, count)
         for name in ("after_gain", "after_loss"):
             after = tuple(getattr(self, name)) or tuple(range(count))
             if len(after) != count or not all(
@@ -149,7 +154,8 @@ class EndStates:
     def shares(self, concentration: float) -> FloatArray:
         """Which share of its time a free end is in each state in the long run, at a concentration in 1/nm^3: (n,).
 
-        Where its states do not depend on which monomer comes to light. NaN if they depend on lengths.
+        Where its states do not depend on which monomer comes to light, and its filament is seldom the shortest. NaN if
+        they depend on lengths.
         """
         if any(self.switch_lengths):
             return np.full(len(self.names), np.nan)
@@ -196,6 +202,7 @@ class EndStates:
         At a concentration in 1/nm^3, of a filament as long as it can be, in nm.
         """
         switches = np.sum(self.switch_rates, axis=1) * self._share_of_rates(longest)
+        switches += np.sum(self.shortest_switch_rates, axis=1)
         return float(np.max(np.array(self.on_rates) * concentration + np.array(self.off_rates) + switches))
 
     def most_gained(self, concentration: float) -> float:
@@ -222,13 +229,28 @@ ENDS = "minus", "plus"
 """Of a filament, at its first and its last node."""
 
 
+def _read_renucleation(own):
+    if own.renucleation_rate is None:
+        return
+    rate = non_negative(own.renucleation_rate, RATE, "renucleation_rate")
+    object.__setattr__(own, "renucleation_rate", rate)
+    if rate < own.rescue_rate:
+        raise InputError("renucleation_rate must not be below rescue_rate, which filaments of any length have.")
+
+
+def _more_at_shortest(own):
+    return 0.0 if own.renucleation_rate is None else own.renucleation_rate - own.rescue_rate
+
+
 @dataclass(frozen=True, kw_only=True)
 class DynamicInstability:
     """An end that grows and shrinks in turn, as those of microtubules do.
 
     While it grows, it has the rates of its monomers; a catastrophe turns it, and a rescue turns it back. With the speed
-    v+ of growth and v- of shrinking, lengths are exponential with the mean v+ v-/(v- f_cat - v+ f_res) where this is
-    positive, and grow without end otherwise (Dogterom and Leibler, Phys. Rev. Lett. 1993, 70, 1347).
+    v+ of growth and v- of shrinking, lengths beyond the shortest are exponential with the mean l = v+ v-/(v- f_cat -
+    v+ f_res) where this is positive, and grow without end otherwise (Dogterom and Leibler, Phys. Rev. Lett. 1993, 70,
+    1347). A filament that has shrunk to the shortest length waits there, 1/r on average for the renucleation_rate r, as
+    a seed does for a new one, and is there for a share 1/(1 + r l (1/v+ + 1/v-)) of the time.
 
     Parameters
     ----------
@@ -243,14 +265,16 @@ class DynamicInstability:
         that an obstacle brings catastrophes about: f_cat is not changed by it if not given.
     catastrophe_length : length, optional
         f_cat is that of a filament of this length, and proportional to lengths, as kinesin-8 makes it.
+    renucleation_rate : 1/time, optional
+        At which an end grows again when its filament has shrunk to the shortest length; the rescue_rate if not given.
 
     The attributes hold plain numbers, in 1/ps, nm^3/ps and nm.
 
     Raises
     ------
     InputError
-        For a rate that is negative or not finite, a ``blocked_catastrophe_rate`` below the ``catastrophe_rate``, or a
-        length that is not positive.
+        For a rate that is negative or not finite, a ``blocked_catastrophe_rate`` below the ``catastrophe_rate``, a
+        ``renucleation_rate`` below the ``rescue_rate``, or a length that is not positive.
     """
 
     catastrophe_rate: float
@@ -259,6 +283,7 @@ class DynamicInstability:
     shrinking_on_rate: float = 0.0
     blocked_catastrophe_rate: float | None = None
     catastrophe_length: float | None = None
+    renucleation_rate: float | None = None
 
     if TYPE_CHECKING:
 
@@ -271,6 +296,7 @@ class DynamicInstability:
             shrinking_on_rate: Scalar = 0.0,
             blocked_catastrophe_rate: Scalar | None = None,
             catastrophe_length: Scalar | None = None,
+            renucleation_rate: Scalar | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -283,6 +309,7 @@ class DynamicInstability:
             object.__setattr__(self, "blocked_catastrophe_rate", blocked)
             if blocked < self.catastrophe_rate:
                 raise InputError("blocked_catastrophe_rate must not be below catastrophe_rate, which a free end has.")
+        _read_renucleation(self)
         if length is not None:
             object.__setattr__(self, "catastrophe_length", positive(length, LENGTH, "catastrophe_length"))
 
@@ -297,6 +324,7 @@ class DynamicInstability:
             names=(GROWING, SHRINKING),
             blocked_switch_rates=((0.0, more), (0.0, 0.0)),
             switch_lengths=(self.catastrophe_length or 0.0, 0.0),
+            shortest_switch_rates=((0.0, 0.0), (_more_at_shortest(self), 0.0)),
         )
 
 
@@ -317,28 +345,37 @@ class TwoUnitCap:
         How many units it loses per time while it shrinks.
     rescue_rate : 1/time
         At which it begins to grow again, with a new cap.
+    renucleation_rate : 1/time, optional
+        That of a filament that has shrunk to the shortest length; the rescue_rate if not given.
 
     The attributes hold plain numbers, in 1/ps.
 
     Raises
     ------
     InputError
-        For a rate that is negative or not finite.
+        For a rate that is negative or not finite, or a ``renucleation_rate`` below the ``rescue_rate``.
     """
 
     hydrolysis_rate: float
     shrinking_off_rate: float
     rescue_rate: float = 0.0
+    renucleation_rate: float | None = None
 
     if TYPE_CHECKING:
 
         def __init__(
-            self, *, hydrolysis_rate: Scalar, shrinking_off_rate: Scalar, rescue_rate: Scalar = 0.0
+            self,
+            *,
+            hydrolysis_rate: Scalar,
+            shrinking_off_rate: Scalar,
+            rescue_rate: Scalar = 0.0,
+            renucleation_rate: Scalar | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
         for name in ("hydrolysis_rate", "shrinking_off_rate", "rescue_rate"):
             object.__setattr__(self, name, non_negative(getattr(self, name), RATE, name))
+        _read_renucleation(self)
 
     def states(self, on_rate: float, off_rate: float) -> EndStates:
         """Of an end with the rates of its monomers, in nm^3/ps and 1/ps: which units are capped, "shrinking"."""
@@ -355,4 +392,5 @@ class TwoUnitCap:
             # What was the last unit is the one before it.
             after_gain=(0, 0, 1, 3),
             names=("capped", "last unit capped", "unit before capped", SHRINKING),
+            shortest_switch_rates=(*((0.0,) * 4,) * 3, (_more_at_shortest(self), 0.0, 0.0, 0.0)),
         )

@@ -107,6 +107,7 @@ def _set_ends(force, index, growth):
         after = np.column_stack([own.after_gain, own.after_loss]).ravel()
         force.setEndStates(index, end, oldest, rates.tolist(), after.tolist(), np.ravel(own.switch_rates).tolist())
         force.setEndSwitching(index, end, list(own.switch_lengths), np.ravel(own.blocked_switch_rates).tolist())
+        force.setSwitchingOfShortest(index, end, np.ravel(own.shortest_switch_rates).tolist())
         of_load = 0.0 if growth.growing_force is None else growth.growing_force * growth.monomers.length
         force.setEndTiming(index, end, growth.deterministic, of_load)
     force.setMonomersHaveStates(index, oldest > 0)

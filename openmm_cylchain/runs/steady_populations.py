@@ -59,19 +59,20 @@ def steady_population(groups, box, concentration):
 
 def _times(ends, concentration, fewest, first, most, monomer):
     # For how long, in ps, a filament has each number of monomers before it vanishes; None if it may never do.
-    gain, loss, switch, by_length = (sum(parts) for parts in zip(*_rates_of_both(ends, concentration)))
+    gain, loss, switch, by_length, of_shortest = (sum(parts) for parts in zip(*_rates_of_both(ends, concentration)))
     sizes, states = most - fewest + 1, len(gain)
     if not loss.any():
         return None
     below_most = np.ones(sizes)
     below_most[-1] = 0.0
     up, down = scipy.sparse.diags([below_most[:-1]], [1]), scipy.sparse.diags([np.ones(sizes - 1)], [-1])
-    lengths = monomer * np.arange(fewest, most + 1)
+    lengths, shortest = monomer * np.arange(fewest, most + 1), np.eye(sizes)[0]
     rates = scipy.sparse.kron(scipy.sparse.identity(sizes), switch)
     rates = rates + scipy.sparse.kron(scipy.sparse.diags([lengths], [0]), by_length)
+    rates = rates + scipy.sparse.kron(scipy.sparse.diags([shortest], [0]), of_shortest)
     rates = rates + scipy.sparse.kron(up, gain) + scipy.sparse.kron(down, loss)
     leaving = np.tile((switch + loss).sum(axis=1), sizes) + np.kron(below_most, gain.sum(axis=1))
-    leaving += np.kron(lengths, by_length.sum(axis=1))
+    leaving += np.kron(lengths, by_length.sum(axis=1)) + np.kron(shortest, of_shortest.sum(axis=1))
     begin = np.zeros(sizes * states)
     begin[(first - fewest) * states] = 1.0
     scale = leaving.max()
@@ -81,8 +82,8 @@ def _times(ends, concentration, fewest, first, most, monomer):
 
 
 def _rates_of_both(ends, concentration):
-    # Of each end, among the states of both, from a row to a column: by gains, by losses, by themselves, and of the last
-    # what there is for each nm of length.
+    # Of each end, among the states of both, from a row to a column: by gains, by losses, by themselves, what there is
+    # of these for each nm of length, and what there is more of the shortest.
     identities = [np.eye(len(own.names)) for own in ends]
     for place, own in enumerate(ends):
         count = np.arange(len(own.names))
@@ -91,5 +92,5 @@ def _rates_of_both(ends, concentration):
         loss[count, own.after_loss] = own.off_rates
         switch, over = np.array(own.switch_rates), np.array(own.switch_lengths)[:, None]
         by_length = np.divide(switch, over, out=np.zeros_like(switch), where=over > 0.0)
-        both = [gain, loss, np.where(over > 0.0, 0.0, switch), by_length]
+        both = [gain, loss, np.where(over > 0.0, 0.0, switch), by_length, np.array(own.shortest_switch_rates)]
         yield [np.kron(one, identities[1]) if place == 0 else np.kron(identities[0], one) for one in both]

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import openmm
 
-from ..couplings.capsule_contacts import as_capsule_contact_force
+from ..couplings.capsule_contacts import as_capsule_contact_force, owners_of_chains
 from ..couplings.walls import as_filament_wall_force
 from ..errors import InputError, TimeStepWarning
 from ..filaments.chain_type import ChainType
@@ -120,8 +120,9 @@ def refuse_countless_monomers(filaments: Sequence[Filament], step: float, box: F
 
 def _fastest_end(filaments, system):
     # Of those that may push, with what it is called.
-    grows = [(number, own) for number, own in enumerate(filaments) if own.growth is not None]
-    if not grows or not any(_may_be_pushed(force) for force in system.getForces()):
+    pushing = set().union(*(_filaments_of(force, filaments) for force in system.getForces()))
+    grows = [(number, own) for number, own in enumerate(filaments) if own.growth is not None and number in pushing]
+    if not grows:
         return "", 0.0
     rates = [
         (own.growth.states(end).most_gained(own.growth.pool.concentration), f"the {end} end of filament {i}")
@@ -132,8 +133,15 @@ def _fastest_end(filaments, system):
     return label, rate
 
 
-def _may_be_pushed(force):
-    return as_filament_wall_force(force) is not None or as_capsule_contact_force(force) is not None
+def _filaments_of(force, filaments):
+    # Those that feel a wall or contacts.
+    contacts, wall = as_capsule_contact_force(force), as_filament_wall_force(force)
+    if contacts is not None:
+        return owners_of_chains(contacts, filaments)
+    if wall is None:
+        return ()
+    held = {wall.getParticle(index) for index in range(wall.getNumParticles())}
+    return (number for number, nodes in enumerate(filaments.node_indices) if int(nodes[0]) in held)
 
 
 def _events(filament, end):

@@ -38,11 +38,14 @@ void EndGrowth::listEvents(const GrowthState& state, int index, const ChainsInSt
             gains -= both;
             losses -= both;
         }
-        if (state.ranges[index].size() > own.leastMonomers)
+        const bool isShortest = state.ranges[index].size() <= own.leastMonomers;
+        if (!isShortest)
             add(GrowthEvent::Lose, losses, 0);
         add(GrowthEvent::Gain, gains, 0);
-        for (size_t to = 0; to < now.switchRates.size(); to++)
-            add(GrowthEvent::Switch, now.switchRates[to]*shareOfRates(state, index, now), to);
+        for (size_t to = 0; to < now.switchRates.size(); to++) {
+            const double more = isShortest && !now.ratesOfShortest.empty() ? now.ratesOfShortest[to] : 0;
+            add(GrowthEvent::Switch, now.switchRates[to]*shareOfRates(state, index, now)+more, to);
+        }
     }
 }
 

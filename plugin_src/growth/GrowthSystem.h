@@ -29,6 +29,8 @@ struct EndState {
     std::vector<double> blockedRates = {};
     /** The length, in nm, of a chain that has these rates, which are proportional to lengths; zero if they are not. */
     double lengthOfRates = 0;
+    /** How much larger the rates at which it changes are while the chain has its fewest monomers, or nothing. */
+    std::vector<double> ratesOfShortest = {};
 };
 
 /** How monomers come and go. */

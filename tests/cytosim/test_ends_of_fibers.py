@@ -66,6 +66,37 @@ def test_ends_that_begin_by_shrinking(tmp_path):
     assert states.on_rates[1] * growth.pool.concentration * length == pytest.approx(0.2 * MICROMETER / SECOND)
 
 
+@pytest.mark.parametrize(
+    ("keys", "plus", "minus"),
+    [
+        ("catastrophe_rate = 0.02; rescue_rate = 0.1; rebirth_rate = 3", 3.1, None),
+        ("catastrophe_rate = 0.02, 0.03; rescue_rate = 0.1, 0.5; rebirth_rate = 3, 4", 3.1, 4.5),
+        ("catastrophe_rate = 0.02; rebirth_rate = inf", 10 / 0.001, None),
+    ],
+)
+def test_fibers_begin_anew_at_the_shortest_length(tmp_path, keys, plus, minus):
+    """Beside rescues there, as mStateP in ``src/sim/fibers/classic_fiber.cc``; those that are deleted do not."""
+    growth = turning_ends(tmp_path, f"{keys}; persistent = 1; min_length = 0.5", "end_state = grow, grow")
+    found = growth.plus_instability.renucleation_rate * SECOND
+    assert found == pytest.approx(plus) and not growth.vanishes and growth.shortest == pytest.approx(500.0)
+    if minus is not None:
+        assert growth.minus_instability.renucleation_rate * SECOND == pytest.approx(minus)
+    shrinking = turning_ends(tmp_path, f"{keys}; persistent = 1", "plus_end = shrink").states("plus")
+    more = plus - (0.1 if "rescue" in keys else 0.0)
+    np.testing.assert_allclose(np.array(shrinking.shortest_switch_rates) * SECOND, [[0, more], [0, 0]])
+    deleted = turning_ends(tmp_path, keys).plus_instability
+    assert deleted.renucleation_rate is None
+
+
+def test_fibers_with_caps_begin_anew_at_the_shortest_length(tmp_path):
+    tube = "set fiber tube { rigidity = 20; activity = dynamic; growing_speed = 0.2; shrinking_speed = -0.4; "
+    tube += "hydrolysis_rate = 0.5; persistent = 1; rebirth_rate = 2 }\nnew tube { length = 2; plus_end = grow }\n"
+    found, document = translated(tmp_path, tube)
+    assert document.missing == []
+    assert found.filaments[0].growth.plus_instability.renucleation_rate * SECOND == pytest.approx(2.0)
+    assert "a unit would come off" in document.text()
+
+
 def single(
     hand, fiber="set fiber tube { rigidity = 20; activity = grow; growing_speed = 0.5 }\n", made="plus_end = grow"
 ):

@@ -320,7 +320,6 @@ def test_fibers_share_a_pool_of_polymer(tmp_path):
     ("keys", "state", "missing"),
     [
         ("activity = dynamic; hydrolysis_rate = 0.1", "plus_end = shrink", "begin by shrinking"),
-        ("activity = classic; persistent = 1; rebirth_rate = 1", "plus_end = grow", "rebirth"),
         ("activity = vector_growth", "plus_end = grow", "growth: vector_growth"),
     ],
 )

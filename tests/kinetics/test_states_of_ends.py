@@ -213,10 +213,117 @@ def test_catastrophes_that_come_with_the_length():
     mean_within(numbers, expected.number, 0.06)
 
 
+@pytest.mark.parametrize("step", [1.0, *(pytest.param(own, marks=pytest.mark.slow) for own in (10.0, 0.1))])
+def test_filaments_that_begin_anew_where_they_are_shortest(step):
+    """With gains g, losses s, f, r, and nu at the shortest: P(growing, n) ~ rho^n, P(shrinking, n+1) ~ (g/s) rho^n.
+
+    rho = g (s + r)/(s (g + f)), and P(shrinking, 0) ~ (g + f)/nu, which the balance of each number of monomers gives.
+    """
+    g, s, f, r, nu = 8.0, 16.0, 0.8, 0.2, 0.5
+    instability = DynamicInstability(
+        catastrophe_rate=f / STEP, rescue_rate=r / STEP, shrinking_off_rate=s / STEP, renucleation_rate=nu / STEP
+    )
+    growth = Growth(
+        monomers=Monomers(length=MONOMER, plus_on_rate=g / STEP / POOL.concentration),
+        pool=POOL,
+        longest=900.0,
+        shortest=FEWEST * MONOMER,
+        plus_instability=instability,
+        minus_capped=True,
+    )
+    filaments, context = contexts_of(growth, 300, 1, step * STEP)
+    context.getIntegrator().step(round(40 / step))
+    waiting, mean, far = [], [], []
+    for _ in range(100):
+        context.getIntegrator().step(round(10 / step))
+        state = filaments.in_context(context).growth()
+        more, shrinks = np.rint(state.lengths._value / MONOMER) - FEWEST, state.end_states[:, 1] == 1
+        waiting.append(np.mean((more == 0) & shrinks))
+        mean.append(more.mean())
+        far.append(np.mean((more >= 5) & ~shrinks))
+    rho = g * (s + r) / (s * (g + f))
+    weights = (g + f) / nu, 1.0 / (1.0 - rho), g / s / (1.0 - rho)
+    mean_within(waiting, weights[0] / sum(weights), 0.05)
+    mean_within(far, weights[1] * rho**5 / sum(weights), 0.05)
+    growing = rho / (1.0 - rho)
+    mean_within(mean, (weights[1] * growing + weights[2] * (growing + 1.0)) / sum(weights), 0.05)
+    assert state.waited.sum() == 0
+    # In the limit of small monomers, as the docstring says.
+    length = g * s / (s * f - g * r)
+    assert 1.0 / (1.0 + nu * length * (1.0 / g + 1.0 / s)) == pytest.approx(weights[0] / sum(weights), rel=0.1)
+
+
+@pytest.mark.parametrize("deterministic", [False, True])
+def test_waiting_times_at_the_shortest_length_are_exponential(deterministic):
+    """From the checkpoint of a moment on again to the bit; longer filaments have no such rate."""
+    states = EndStates(
+        on_rates=[0.0, 0.0],
+        off_rates=[3.0 / STEP, 0.0],
+        switch_rates=[[0.0, 0.0], [0.0, 0.0]],
+        shortest_switch_rates=[[0.0, 0.25 / STEP], [0.0, 0.0]],
+    )
+    own = dict(monomers=Monomers(length=MONOMER), pool=POOL, longest=900.0, plus_instability=states)
+    own |= dict(minus_capped=True, deterministic=deterministic)
+    filaments = Filaments(WATER, TEMPERATURE)
+    growths = [Growth(**own, shortest=PER_SEGMENT * MONOMER), Growth(**own, shortest=FEWEST * MONOMER)]
+    for number in range(1000):
+        filaments.add_straight(ACTIN, 1, [0, 0, 50.0 * number], [1, 0, 0], growth=growths[number % 2])
+    context = context_of(filaments)
+    shares = []
+    for step in range(1, 9):
+        if step == 4:
+            checkpoint = context.createCheckpoint()
+        context.getIntegrator().step(1)
+        now = filaments.in_context(context).growth().end_states[:, 1]
+        shares.append(np.mean(now[::2] == 0))
+        # The others need 36 losses first, of 3 in a step.
+        assert step > 4 or not now[1::2].any()
+    expected = np.exp(-0.25 * np.arange(1, 9))
+    errors = np.sqrt(expected * (1.0 - expected) / 500)
+    assert np.all(np.abs(shares - expected) < 4.0 * errors) and np.all(4.0 * errors < 0.3 * expected + 0.05)
+    context.getIntegrator().step(8)
+    found = filaments.in_context(context).growth()
+    if deterministic:
+        # 12 of 16 steps until they are the shortest.
+        assert found.end_states[1::2, 1].mean() == pytest.approx(1.0 - np.exp(-1.0), abs=4.0 * 0.022)
+    context.loadCheckpoint(checkpoint)
+    context.getIntegrator().step(13)
+    again = filaments.in_context(context).growth()
+    assert np.array_equal(found.end_states, again.end_states) and np.array_equal(found.lengths, again.lengths)
+
+
+def test_filaments_that_vanish_may_be_saved_by_beginning_anew():
+    """The steady population against one that is counted: at the shortest, a monomer is lost or growth begins again."""
+    turns = DynamicInstability(
+        catastrophe_rate=0.4 / STEP,
+        rescue_rate=0.0,
+        shrinking_off_rate=40.0 / STEP,
+        renucleation_rate=60.0 / STEP,
+    )
+    growth = growing_until_it_turns(turns, longest=900 * MONOMER)
+    nucleation = Nucleation(rate=8.0 / STEP, region=Sphere([0, 0, 0], 500.0))
+    group = SimpleNamespace(type=ACTIN, growth=growth, nucleation=nucleation)
+    expected = steady_population([group], None, POOL.concentration)
+    # At the shortest with the chance 0.6 it grows on: 1/0.4 lives of 1/f + 1/f, but for what it takes to vanish.
+    assert expected.number == pytest.approx(8.0 * 2.5 * (2.0 / 0.4 + 1.0 / 100.0), rel=0.01)
+    filaments = Filaments(WATER, TEMPERATURE)
+    filaments.add_reserve(ACTIN, 250, growth=growth, nucleation=nucleation)
+    context = context_of(filaments)
+    context.getIntegrator().step(60)
+    numbers = []
+    for _ in range(40):
+        context.getIntegrator().step(15)
+        state = filaments.in_context(context).growth()
+        numbers.append((state.nodes > 0).sum())
+    assert state.without_place == 0
+    mean_within(numbers, expected.number, 0.08)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         (dict(blocked_catastrophe_rate=0.1 / STEP), "must not be below"),
+        (dict(renucleation_rate=-1.0), "renucleation_rate"),
         (dict(blocked_catastrophe_rate=60.0 / STEP), "only .* monomers/s come"),
         (dict(blocked_catastrophe_rate=float("nan")), "blocked_catastrophe_rate"),
         (dict(catastrophe_length=0.0), "catastrophe_length"),
@@ -228,12 +335,14 @@ def test_wrong_catastrophes_are_refused(options, message):
 
 
 def test_a_system_keeps_what_rates_of_ends_depend_on():
-    both = turning(catastrophe_length=300.0, blocked_catastrophe_rate=2.0 / STEP)
+    both = turning(catastrophe_length=300.0, blocked_catastrophe_rate=2.0 / STEP, renucleation_rate=0.3 / STEP)
     filaments = Filaments(WATER, TEMPERATURE)
     filaments.add_straight(ACTIN, 3, [0, 0, 0], [1, 0, 0], growth=growing_until_it_turns(both, longest=700 * MONOMER))
     _, system, _ = filaments.build()
     text = openmm.XmlSerializer.serialize(system)
     assert openmm.XmlSerializer.serialize(openmm.XmlSerializer.deserialize(text)) == text
-    force = find_growth_force(openmm.XmlSerializer.deserialize(text))
+    again = openmm.XmlSerializer.deserialize(text)
+    force = find_growth_force(again)
+    assert force.getSwitchingOfShortest(0, 1) == pytest.approx((0.0, 0.0, 0.3 / STEP, 0.0))
     lengths, blocked = force.getEndSwitching(0, 1)
     assert lengths == (300.0, 0.0) and blocked == pytest.approx((0.0, 1.6 / STEP, 0.0, 0.0))

@@ -83,6 +83,23 @@ def test_what_is_read_is_that_of_python():
     assert per_second([cap.hydrolysis_rate, cap.shrinking_off_rate]) == pytest.approx([0.4, 56.0])
 
 
+def test_ends_that_begin_anew_at_the_shortest_length_are_read():
+    minus = f"minus_{TURNING}".replace(", ", ", minus_")
+    growth = parse(f'{TURNING}, renucleation_rate = "3 1/s", {minus}').filaments[0].growth
+    assert growth.plus_instability.renucleation_rate * 1e12 == pytest.approx(3.0)
+    assert growth.minus_instability.renucleation_rate is None
+    cap = parse('hydrolysis_rate = "0.4 1/s", shrinking_off_rate = "56 1/s", renucleation_rate = "3 1/s"')
+    assert np.array(cap.filaments[0].growth.states("plus").shortest_switch_rates)[3, 0] * 1e12 == pytest.approx(3.0)
+    own = parse(
+        'plus_states = [{ name = "a", switch_rates = { b = "2 1/s" } }, '
+        '{ name = "b", shortest_switch_rates = { a = "4 1/s" } }]'
+    )
+    found = np.array(own.filaments[0].growth.states("plus").shortest_switch_rates)
+    assert found.ravel() * 1e12 == pytest.approx([0.0, 0.0, 4.0, 0.0])
+    with pytest.raises(InputError, match=r"line \d+: .*renucleation_rate must not be below rescue_rate"):
+        parse(f'{TURNING}, renucleation_rate = "0.5 1/s"')
+
+
 def test_catastrophes_of_blocked_ends_and_of_long_filaments_are_read():
     more = ', blocked_catastrophe_rate = "4 1/s", catastrophe_length = "2 um"'
     minus = "".join(f", minus_{one}" for one in (TURNING + more).split(", "))

@@ -10,7 +10,7 @@ from openmm_cylchain import InputError, analysis, find_contacts
 from openmm_cylchain.couplings.capsule_contacts import as_capsule_contact_force
 from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.created_simulation import begin, create_simulation
-from openmm_cylchain.runs.initial_state import build_system
+from openmm_cylchain.runs.initial_state import build_system, recommended_step
 from openmm_cylchain.runs.relaxation import relaxed_positions
 from openmm_cylchain.runs.run import run
 from openmm_cylchain.runs.run_directory import RunDirectory
@@ -197,6 +197,17 @@ def test_growing_ends_are_in_the_way_of_what_they_touch_alone(keys, passes):
         text += f'[[tether]]\nfilament = 1\nnode = {node}\nstiffness = "10 pN/nm"\n'
     farthest = positions_after(text, 60)[0][:, 0].max()
     assert farthest > 130.0 if passes else 95.0 < farthest < 110.0
+
+
+def test_recommended_steps_are_of_growing_ends_that_touch_something():
+    """A monomer comes in 1 us, of which a fifth may come in a step where the end pushes."""
+    text = HEAD + MONOMERS + rod([0, 1], 500.0, THICK)
+    reasons = []
+    for keys in (THIN, NONE):
+        configuration = parse_configuration(text + growing(0.0, keys))
+        step = recommended_step(configuration, "implicit", None, 1)
+        reasons.append(any("plus end of filament 1 gains 1e+06" in name for name in step.allowed))
+    assert reasons == [True, False]
 
 
 def test_branches_begin_where_they_touch_their_mothers():

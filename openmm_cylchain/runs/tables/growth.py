@@ -15,7 +15,7 @@ PRESETS = {"MDIA1_ENDS": MDIA1_ENDS}
 
 _INSTABILITY = ("catastrophe_rate", "rescue_rate", "shrinking_off_rate")
 _OF_CATASTROPHES = ("shrinking_on_rate", "blocked_catastrophe_rate", "catastrophe_length")
-_TURNING = (*_INSTABILITY, "hydrolysis_rate", *_OF_CATASTROPHES)
+_TURNING = (*_INSTABILITY, "hydrolysis_rate", *_OF_CATASTROPHES, "renucleation_rate")
 _PREFIXES = {"minus": "minus_", "plus": ""}
 """Of what turns each end."""
 _OF_GROWTH = ("longest", "shortest", "plus_capped", "minus_capped", "deterministic", "growing_force", "vanishes")
@@ -40,6 +40,12 @@ _STATE = TableKind(
             Named(Quantity(units.RATE, "zero"), "rates by names of states", '{ shrinking = "0.5 1/s" }'),
             None,
             "How much larger switch_rates are while growth is blocked; not at all if not given.",
+        ),
+        Key(
+            "shortest_switch_rates",
+            Named(Quantity(units.RATE, "zero"), "rates by names of states", '{ growing = "1 1/s" }'),
+            None,
+            "How much larger switch_rates are while the filament has its shortest length; not at all if not given.",
         ),
         Key(
             "switch_length",
@@ -100,6 +106,12 @@ GROWTH = TableKind(
             None,
             "catastrophe_rate is that of a filament of this length, and proportional to lengths, if given.",
         ),
+        Key(
+            "renucleation_rate",
+            _RATE,
+            None,
+            "At which the plus end grows again when its filament has shrunk to the shortest; rescue_rate if not given.",
+        ),
         Key("minus_catastrophe_rate", _RATE, None, "At which the minus end begins to shrink; as that of the plus end."),
         Key("minus_hydrolysis_rate", _RATE, None, "In place of it, likewise."),
         Key("minus_rescue_rate", _RATE, None, "At which the minus end begins to grow again."),
@@ -107,6 +119,7 @@ GROWTH = TableKind(
         Key("minus_shrinking_on_rate", Quantity(units.ON_RATE, "zero"), None, "k_on of the minus end, likewise."),
         Key("minus_blocked_catastrophe_rate", _RATE, None, "That of a minus end whose growth is blocked, likewise."),
         Key("minus_catastrophe_length", Quantity(units.LENGTH), None, "Of catastrophes of the minus end, likewise."),
+        Key("minus_renucleation_rate", _RATE, None, "At which the minus end of the shortest grows again, likewise."),
         Key(
             "plus_states",
             Either(((list, _STATES), (object, Choice(tuple(PRESETS))))),
@@ -221,6 +234,7 @@ def _states(tables, on_rate, off_rate):
         off_rates=[off_rate if own["off_rate"] is None else own["off_rate"] for own in tables],
         switch_rates=_switches(tables, names, "switch_rates"),
         blocked_switch_rates=_switches(tables, names, "blocked_switch_rates"),
+        shortest_switch_rates=_switches(tables, names, "shortest_switch_rates"),
         switch_lengths=[own["switch_length"] or 0.0 for own in tables],
         names=names,
         **after,

@@ -184,34 +184,54 @@ void CylinderChainGrowthForce::getEndStates(int index, int end, int& initialStat
     }
 }
 
+/** Set rates of the states of an end, from each to each, in one of their vectors, which is empty if all are zero. */
+static void setRates(vector<EndState>& states, vector<double> EndState::*own, const vector<double>& rates) {
+    const size_t count = states.size();
+    requireOfGrowth(rates.size() == count*count, "There must be a rate from each state of an end to each");
+    requireOfGrowth(all_of(rates.begin(), rates.end(), isRate), "Rates of ends cannot be negative and must be finite");
+    for (size_t i = 0; i < count; i++) {
+        requireOfGrowth(rates[i*count+i] == 0, "No state can change to itself");
+        vector<double>& values = states[i].*own;
+        values.assign(rates.begin()+i*count, rates.begin()+(i+1)*count);
+        if (all_of(values.begin(), values.end(), [] (double rate) {return rate == 0;}))
+            values.clear();
+    }
+}
+
+static void getRates(const vector<EndState>& states, vector<double> EndState::*own, vector<double>& rates) {
+    rates.clear();
+    for (size_t i = 0; i < states.size(); i++) {
+        const vector<double>& values = states[i].*own;
+        rates.insert(rates.end(), values.begin(), values.end());
+        rates.resize((i+1)*states.size(), 0);
+    }
+}
+
 void CylinderChainGrowthForce::setEndSwitching(int index, int end, const vector<double>& lengths,
         const vector<double>& rates) {
     vector<EndState>& states = endOf(getOwn(index), end).states;
-    const size_t count = states.size();
-    requireOfGrowth(lengths.size() == count && rates.size() == count*count, "There must be a length for each state of "
-            "an end, and a rate from each to each");
-    for (const vector<double>* values : {&lengths, &rates})
-        requireOfGrowth(all_of(values->begin(), values->end(), isRate),
-                "Lengths and rates of ends cannot be negative and must be finite");
-    for (size_t i = 0; i < count; i++) {
-        requireOfGrowth(rates[i*count+i] == 0, "No state can change to itself");
+    requireOfGrowth(lengths.size() == states.size() && all_of(lengths.begin(), lengths.end(), isRate),
+            "There must be a length for each state of an end, which cannot be negative and must be finite");
+    setRates(states, &EndState::blockedRates, rates);
+    for (size_t i = 0; i < states.size(); i++)
         states[i].lengthOfRates = lengths[i];
-        states[i].blockedRates.assign(rates.begin()+i*count, rates.begin()+(i+1)*count);
-        if (all_of(states[i].blockedRates.begin(), states[i].blockedRates.end(), [] (double rate) {return rate == 0;}))
-            states[i].blockedRates.clear();
-    }
 }
 
 void CylinderChainGrowthForce::getEndSwitching(int index, int end, vector<double>& lengths,
         vector<double>& rates) const {
     const vector<EndState>& states = endOf(getOwn(index), end).states;
     lengths.clear();
-    rates.clear();
-    for (const EndState& state : states) {
+    for (const EndState& state : states)
         lengths.push_back(state.lengthOfRates);
-        rates.insert(rates.end(), state.blockedRates.begin(), state.blockedRates.end());
-        rates.resize(lengths.size()*states.size(), 0);
-    }
+    getRates(states, &EndState::blockedRates, rates);
+}
+
+void CylinderChainGrowthForce::setSwitchingOfShortest(int index, int end, const vector<double>& rates) {
+    setRates(endOf(getOwn(index), end).states, &EndState::ratesOfShortest, rates);
+}
+
+void CylinderChainGrowthForce::getSwitchingOfShortest(int index, int end, vector<double>& rates) const {
+    getRates(endOf(getOwn(index), end).states, &EndState::ratesOfShortest, rates);
 }
 
 void CylinderChainGrowthForce::setEndTiming(int index, int end, bool isRegular, double energy) {

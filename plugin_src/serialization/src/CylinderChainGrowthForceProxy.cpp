@@ -64,6 +64,8 @@ static void write(const CylinderChainGrowthForce& force, SerializationNode& node
             force.getEndSwitching(i, end, lengths, blockedRates);
             columns.put("lengthsOfRates", lengths);
             columns.put("blockedRates", blockedRates);
+            force.getSwitchingOfShortest(i, end, switchRates);
+            columns.put("ratesOfShortest", switchRates);
             columns.write(own.createChildNode("End"));
         }
     }
@@ -117,8 +119,9 @@ static unique_ptr<CylinderChainGrowthForce> readGrowthForce(const SerializationN
                         columns.getOne<double>("energyOfLoad"));
                 force->setEndStates(index, end, columns.getOne<int>("initialState"), columns.get<double>("rates"),
                         columns.get<int>("statesAfter"), columns.get<double>("switchRates"));
-                force->setEndSwitching(index, end++, columns.get<double>("lengthsOfRates"),
+                force->setEndSwitching(index, end, columns.get<double>("lengthsOfRates"),
                         columns.get<double>("blockedRates"));
+                force->setSwitchingOfShortest(index, end++, columns.get<double>("ratesOfShortest"));
             }
     }
     for (auto& nucleator : node.getChildNode("Nucleators").getChildren()) {

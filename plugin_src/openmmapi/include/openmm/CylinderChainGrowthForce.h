@@ -128,6 +128,18 @@ public:
      */
     void getEndSwitching(int index, int end, std::vector<double>& parameters, std::vector<double>& loads) const;
     /**
+     * Set how much larger the rates at which an end changes its states are while the chain has its fewest monomers.
+     *
+     * @param index  the index of the chain among those that grow
+     * @param end    the minus end (0) or the plus end (1)
+     * @param loads  for each state, those to each of them, measured in 1/ps
+     */
+    void setSwitchingOfShortest(int index, int end, const std::vector<double>& loads);
+    /**
+     * Get how much larger rates are while the chain has its fewest monomers, see setSwitchingOfShortest().
+     */
+    void getSwitchingOfShortest(int index, int end, std::vector<double>& loads) const;
+    /**
      * Set how monomers come and go at an end.
      *
      * @param index      the index of the chain among those that grow
