@@ -111,6 +111,8 @@ def _complete(name, stages, document, later):
                 continue
             absent = {**table, **dict([_ABSENT[name]])} if name in _ABSENT else dict(table)
             absent.pop("bound", None)
+            if "contacts" not in own:
+                absent.pop("contact_diameter", None)
             complete.append(absent)
             if number == 0:
                 _write_absent(name, absent, source, whose, document)

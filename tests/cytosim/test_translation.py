@@ -447,6 +447,16 @@ def test_contacts_of_fibers_are_those_of_their_properties(tmp_path):
     diameters = [[own.contact_diameter for own in stage.configuration.filaments] for stage in found.stages]
     assert diameters == [[30, 40, None, 40], [40, 40, 28, 40], [None] * 4]
     assert document.missing == []
+    # Fibers that come later, and contacts that come with them, beside beads that push each other before.
+    thin, later = fibers.split("set fiber thick ")
+    bead = "set bead ball { steric = 1 }\nnew 2 ball { radius = 0.1 }\n"
+    for first in (thin.replace("1, 0.015", "1, 0.05"), bead):
+        off = system.replace("steric = 1", "steric = 0") if first != bead else system
+        comes = "run 100 system\nchange system { steric = 1, 500 }\nset fiber thick " + later
+        found, document = translated(tmp_path, first + comes, off)
+        kept = [own.contact_diameter for own in found.stages[1].configuration.filaments]
+        assert kept == [100] * (first != bead) + [40, None, 40]
+        assert document.missing == []
 
 
 def test_walls_contacts_and_boxes(tmp_path):
