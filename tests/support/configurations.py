@@ -25,6 +25,7 @@ segment_length = "100 nm"
 segments = 12
 closed = true
 normal = [0, 1, 0]
+contacts = false
 [[filament]]
 name = "OWN"
 diameter = "7 nm"
@@ -36,6 +37,7 @@ planar = true
 height = "500 nm"
 count = 2
 propulsion = "0.01 pN"
+contact_diameter = "12 nm"
 [[particles]]
 name = "COL"
 diameter = "50 nm"
@@ -338,7 +340,7 @@ longest = "1 um"
 minus_capped = true
 plus_states = [
     { name = "free", switch_rates = { "in pause" = "60 1/s" }, blocked_switch_rates = { "in pause" = "99 1/s" } },
-    { name = "with formin", on_rate = "3 1/(uM*s)", off_rate = "0.4 1/s" },
+    { name = "with formin", on_rate = "3 1/(uM*s)", off_rate = "0.4 1/s", shortest_switch_rates = { free = "9 1/s" } },
     { name = "in pause", on_rate = "0 1/(uM*s)", off_rate = "0 1/s", switch_rates = { free = "30 1/s" } },
 ]
 [[filament]]
@@ -356,6 +358,7 @@ minus_rescue_rate = "20 1/s"
 minus_shrinking_off_rate = "50 1/s"
 minus_shrinking_on_rate = "0.1 1/(uM*s)"
 minus_blocked_catastrophe_rate = "30 1/s"
+minus_renucleation_rate = "40 1/s"
 [[filament]]
 type = "MICROTUBULE"
 segment_length = "160 nm"
