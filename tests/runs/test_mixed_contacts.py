@@ -241,6 +241,36 @@ def test_filaments_that_begin_have_the_diameter_of_their_table():
         parse_configuration(text.replace("table = 1\n", f"table = 1\n{THIN}\n"))
 
 
+def test_a_run_that_is_loaded_has_the_contacts_of_its_own_filaments(tmp_path):
+    """Behind one that nothing touches: at the start, at which the second and the third overlap by 1 nm."""
+    text = HEAD + rod([0.6, 0.8], 3.0, NONE) + rod([1, 0], 0.0, THIN) + rod([0, 1], 16.0, THICK)
+    run(parse_configuration(text), tmp_path / "out")
+    loaded = analysis.load(tmp_path / "out")
+    found = loaded.contacts(0)
+    assert found.filaments.tolist() == [[1, 2]] and found.gaps == pytest.approx([-1.0], abs=1e-4)
+    assert found.forces / PICONEWTON_PER_NANOMETER == pytest.approx([5.0], abs=1e-3)
+    assert loaded.contact_forces["load (pN)"][0] == pytest.approx([0.0, 5.0, 5.0], abs=1e-3)
+
+
+@pytest.mark.parametrize("step", ["0.1 us", "100 us"])
+def test_steps_with_soft_and_hard_contacts_know_the_mean_alone(step):
+    """Of a rod that 5 pN press on another one across, which is held: of 8 and 26 nm as of 17 nm both."""
+    head = HEAD.replace('"1 us"', f'"{step}"').replace('"0.2 ms"', '"20 ms"')
+    head = head.replace('"20 us"', '"1 ms"').replace('"40 us"', '"1 ms"')
+    for node in (0, 1):
+        point = ["0 nm", f"{100 * node - 50} nm", "12 nm"]
+        head += f'[[tether]]\nfilament = 0\nnode = {node}\nstiffness = "20 pN/nm"\n'
+        head += f'[[tether]]\nfilament = 1\nnode = {node}\nstiffness = "0.5 pN/nm"\npoint = {json.dumps(point)}\n'
+    both = 'contact_diameter = "17 nm"'
+    mixed, uniform = (
+        positions_after(head + rod([1, 0], 0.0, first) + rod([0, 1], 17.0, second), 50)
+        for first, second in ((THIN, THICK), (both, both))
+    )
+    np.testing.assert_allclose(mixed, uniform, atol=1e-6)
+    distance = np.mean(mixed[1][:, 2]) - np.mean(mixed[0][:, 2])
+    assert 14.0 < distance < 18.0
+
+
 STAGES = """
 [[stage]]
 name = "thin"
