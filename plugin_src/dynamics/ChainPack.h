@@ -13,7 +13,7 @@ struct LaneTether : Tether {
     int lane, number;
 };
 
-/** Twist of the chains of a pack, all of which have the same number of segments. See ChainTwist. */
+/** Twist of the chains of a pack: see ChainTwist. What fills up has no stiffness. */
 template <class Scalar> struct PackTwist {
     /**
      * Of the joint at each node, [node][lane]: the stiffness, the angle at rest, how fast it is turned, and a torque

@@ -41,23 +41,28 @@ inline int numTwists(const Pack& pack) {
 /** Bring twists into lanes, less those at rest. */
 template <int W> void gatherTwists(const Pack& pack, const StepSettings& settings, typename Lanes<W>::Type* twists) {
     typedef typename Lanes<W>::Type Real;
-    for (int node = 0; node < numTwists(pack); node++) {
-        Real rest = loaded<Real>(pack.twist.rest, node);
-        for (int i = 0; i < W; i++)
-            lane(twists[node], i) = pack.chain[i] < 0 ? 0 :
-                    (*settings.twists)[pack.chain[i]][pack.closed ? node%pack.segments : node]-lane(rest, i);
+    for (int node = 0; node < numTwists(pack); node++)
+        twists[node] = -loaded<Real>(pack.twist.rest, node);
+    for (int i = 0; i < W && pack.twist.isPresent(); i++) {
+        if (pack.chain[i] < 0)
+            continue;
+        const std::vector<double>& own = (*settings.twists)[pack.chain[i]];
+        for (std::size_t joint = 0; joint < own.size(); joint++)
+            lane(twists[joint], i) += own[joint];
+        if (pack.closed)
+            lane(twists[pack.segments], i) += own[0];
     }
 }
 
 /** Write how much the twists of some lanes change. */
 template <int W> void scatterTwists(const Pack& pack, const StepSettings& settings,
-            const typename Lanes<W>::Type* changes, const bool* taken) {
-    typedef typename Lanes<W>::Type Real;
-    for (int node = pack.closed ? 1 : 0; node < numTwists(pack); node++) {
-        Real change = changes[node];
-        for (int i = 0; i < W; i++)
-            if (pack.chain[i] >= 0 && (taken == NULL || taken[i]))
-                (*settings.twistChanges)[pack.chain[i]][pack.closed ? node%pack.segments : node] = lane(change, i);
+            typename Lanes<W>::Type* changes, const bool* taken) {
+    for (int i = 0; i < W && pack.twist.isPresent(); i++) {
+        if (pack.chain[i] < 0 || (taken != NULL && !taken[i]))
+            continue;
+        std::vector<double>& own = (*settings.twistChanges)[pack.chain[i]];
+        for (std::size_t joint = 0; joint < own.size(); joint++)
+            own[joint] = lane(changes[pack.closed && joint == 0 ? pack.segments : joint], i);
     }
 }
 

@@ -15,8 +15,8 @@ public:
     typedef typename SegmentEquations<W>::Geometry Geometry;
     typedef typename Coordinates<W>::Factors Factors;
     ImplicitEquations(const ImplicitState<W>& step, ImplicitTwist<W, CLOSED>& twist, Memory& memory) : step(step),
-            pack(step.pack), n(step.n), segments(step.segments), change(step.change), twist(twist), ofSegments(step),
-            band(pack, memory) {
+            pack(step.pack), n(step.n), segments(step.segments), change(step.change), twist(twist),
+            isTwisted(HAS_TWIST && pack.twist.isPresent()), ofSegments(step), band(pack, memory) {
     }
     /**
      * Linearise the equations around y, and eliminate the nodes from first to last.
@@ -27,10 +27,9 @@ public:
         ofSegments.begin(iteration);
         if (step.settings.flow.present)
             ofSegments.addDragOfFlow(y);
-        const bool isTwisted = HAS_TWIST && pack.twist.isPresent();
         if constexpr (HAS_TWIST)
             if (isTwisted)
-                twist.addForces(y);
+                twist.addForces(y, iteration > 0 || step.settings.flow.present);
         Row rows[3];
         Row *before = rows, *here = rows+1, *after = rows+2;
         // Roots and divisions take long: those of the segment ahead come before the node is eliminated.
@@ -40,7 +39,7 @@ public:
         band.begin();
         *here = Row {};
         here->right = step.loads[0];
-        ofSegments.describeNew(y, 0, ahead);
+        describeNew(y, 0, ahead);
         for (int s = 0; s < n-1; s++) {
             if constexpr (CLOSED)
                 *after = Row {};
@@ -66,7 +65,7 @@ public:
             if (isTwisted && s > 0)
                 twist.addStiffness(s, previous, current, *before, *here);
             if (s < n-2) {
-                ofSegments.describeNew(y, s+1, ahead);
+                describeNew(y, s+1, ahead);
                 Coordinates<W>::describeNew(step, s+1, current, ahead, factorsAhead);
             }
             if (s > 0)
@@ -90,8 +89,7 @@ public:
     /** Find the changes of y and the tensions, or add to them. */
     template <Goal GOAL> void substitute() {
         band.template substitute<GOAL>(change, [&] (int s, Real tension) {
-            ImplicitSegment<Real>& segment = segments[s];
-            segment.multiplier = tension+segment.shift*segment.newTangent.dot(change[s+1]-change[s]);
+            setMultiplier(s, tension);
         });
     }
     /** Let the change of tensions act along the mean direction as well, with the same elimination. */
@@ -110,6 +108,17 @@ public:
     void respond(const Vec* forces, Vec* moves) {
         band.setForcesOnNodes(forces);
         band.template substitute<Goal::Nodes>(moves, [] (int, Real) {});
+    }
+    /** The same, with how they change tensions. */
+    void respond(const Vec* forces, Vec* moves, Real* ofTensions) {
+        band.setForcesOnNodes(forces);
+        band.respond(moves, ofTensions);
+    }
+    /** Add a multiple of that to the changes of y and of the tensions. */
+    void addResponse(const Vec* moves, const Real* ofTensions, Real factor) {
+        band.addResponse(moves, ofTensions, factor, change, [&] (int s, Real tension) {
+            setMultiplier(s, tension);
+        });
     }
     /**
      * Set forces on nodes that come from couplings with other chains, or NULL for none. They are no part of the right
@@ -147,12 +156,25 @@ private:
     ImplicitSegment<Real>* const segments;
     Vec* const change;
     ImplicitTwist<W, CLOSED>& twist;
+    const bool isTwisted;
     SegmentEquations<W> ofSegments;
     const CouplingTerm* terms = NULL;
     int numTerms = 0;
     const Vec* forcesOfOthers = NULL;
     Band band;
 
+    CYLCHAIN_INLINE void setMultiplier(int s, Real tension) {
+        ImplicitSegment<Real>& segment = segments[s];
+        segment.multiplier = tension+segment.shift*segment.newTangent.dot(change[s+1]-change[s]);
+    }
+    CYLCHAIN_INLINE void describeNew(const Vec* y, int s, Geometry& geometry) const {
+        if constexpr (HAS_TWIST)
+            if (isTwisted) {
+                geometry = twist.getSegment(s);
+                return;
+            }
+        ofSegments.describeNew(y, s, geometry);
+    }
     /** Add the terms of couplings of a segment, the next ones, to the equations of its nodes. */
     void addTerms(int s, int& next, Row& here, Row& after) {
         for (; next < numTerms && terms[next].node == s; next++) {

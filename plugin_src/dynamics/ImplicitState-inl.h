@@ -4,6 +4,8 @@
  * What an implicit step keeps of segments, of joints and of tethers while it is taken, and the forces of its stages.
  */
 
+#include "dynamics/coordinates/CoordinateKind-inl.h"
+
 /** What all iterations of a step look at in a segment, and in the joint with the segment before. */
 template <class Real> struct IteratedSegment {
     // At the start: the vector, its direction and length, and where a bend turns around.
@@ -42,10 +44,12 @@ template <class Real> struct TwistedJoint {
     Real friction, random, inversePivot, border;
     // What this joint has of all torques when each twist changes by as much.
     Real share;
-    // For some new nodes: the area swept, the torque, how the segment turns, and one over its length.
-    Real swept, torque, turn, perLength;
-    // Half the curvature binormal in the middle of the step.
+    // For some new nodes: the area swept, the torque, how the segment turns.
+    Real swept, torque, turn;
+    // In the middle of the step: half the curvature binormal, and one over one plus the cosine of the joint.
     Vector<Real> curvature;
+    Real perCosine;
+    NewSegmentGeometry<Real> segment;
 };
 
 /** The vector from the point of a tether to its node. */
@@ -88,7 +92,7 @@ template <int W> class ImplicitState {
     typedef Vector<Real> Vec;
 public:
     struct Memory {
-        Scratch segments, vectors, tethers, joints, gradients;
+        Scratch segments, vectors, tethers, joints, gradients, responses;
     };
     ImplicitState(const Pack& pack, const StepSettings& settings, const StepStart<W>& start, Memory& memory) :
             pack(pack), settings(settings), start(start), n(pack.nodes), h(settings.stepSize), kT(settings.kT),
@@ -99,7 +103,8 @@ public:
             loads(settings.flow.present || pack.twist.isPresent() ? f+3*n : f), change(f+n), rest(f+2*n),
             external(twoStages ? f+4*n : f), random(twoStages ? f+5*n : f), drift(twoStages ? f+6*n : f),
             joints(memory.joints.template reserve<TwistedJoint<Real> >(pack.twist.isPresent() ? n : 0)),
-            gradient(memory.gradients.template reserve<Vec>(pack.twist.isHeld ? 3*n : 0)) {
+            gradient(memory.gradients.template reserve<Vec>(pack.twist.isHeld ? 3*n : 0)),
+            responsesOfTensions(memory.responses.template reserve<Real>(pack.twist.isHeld ? n : 0)) {
     }
     const Pack& pack;
     const StepSettings& settings;
@@ -113,9 +118,11 @@ public:
     Vec *const f, *const loads, *const change, *const rest;
     // Forces from outside, of noise and the metric ones; all of them are f if there is one stage alone.
     Vec *const external, *const random, *const drift;
-    // Of twist, if there is any; the second is the gradient of what a chain shares, and memory of its own.
+    // Of twist, if there is any; the others are the gradient of what a chain shares, memory of its own, and how
+    // tensions respond to that gradient.
     TwistedJoint<Real>* const joints;
     Vec* const gradient;
+    Real* const responsesOfTensions;
     Stage stage = Stage::Only;
     /** How much of the forces that last for the whole step a stage has. */
     Scalar shareOfForces() const {

@@ -20,27 +20,36 @@ constexpr bool HAS_TWIST = sizeof(Scalar) == sizeof(double);
 /** By this much, nodes may give way to the torque that all of a chain shares without its being in their equations. */
 const Scalar NEARLY_RIGID = 0.1;
 
+/** tan(pi/8). */
+const Scalar TANGENT_OF_EIGHTH = M_SQRT2-1;
+
+/** The angle whose tangent is within 0.2, to 10^-17 there. */
+template <class Real> CYLCHAIN_INLINE Real arctangent(Real tangent) {
+    const Real square = tangent*tangent;
+    Real result = splat<Real>(1.0/21);
+#pragma GCC unroll 10
+    for (int k = 19; k > 0; k -= 2)
+        result = splat<Real>(1.0/k)-square*result;
+    return result*tangent;
+}
+
 /** The angle of a complex number x+iy, in (-pi, pi). */
 template <class Real> CYLCHAIN_INLINE Real argument(Real x, Real y) {
-    const Real tangent = y/x, square = tangent*tangent;
+    const Real zero = Real{}, tangent = y/x;
+    Real square = x > zero ? tangent*tangent : splat<Real>(1);
     bool isSmall = true;
-    for (int i = 0; i < LANE_COUNT<Real>; i++) {
-        Real s = square, a = x;
-        isSmall &= lane(a, i) > 0 && lane(s, i) < 0.03;
-    }
-    Real result;
-    if (isSmall) {
-        // Its series, to 10^-17 at the limit.
-        result = splat<Real>(1.0/21);
-        for (int k = 19; k > 0; k -= 2)
-            result = splat<Real>(1.0/k)-square*result;
-        return result*tangent;
-    }
-    for (int i = 0; i < LANE_COUNT<Real>; i++) {
-        Real a = x, b = y;
-        lane(result, i) = std::atan2(lane(b, i), lane(a, i));
-    }
-    return result;
+    for (int i = 0; i < LANE_COUNT<Real>; i++)
+        isSmall &= lane(square, i) < 0.04;
+    if (isSmall)
+        return arctangent<Real>(tangent);
+    // Of an angle within pi/4, half of what it is beyond pi/8.
+    const Real across = y < zero ? -y : y, along = x < zero ? -x : x;
+    const Real least = lesser<Real>(across, along), most = larger<Real>(across, along)+TINY;
+    const Real beyond = (least-TANGENT_OF_EIGHTH*most)/(most+TANGENT_OF_EIGHTH*least);
+    Real angle = M_PI/8+2*arctangent<Real>(beyond/(1+root(1+beyond*beyond)));
+    angle = across > along ? M_PI/2-angle : angle;
+    angle = x < zero ? M_PI-angle : angle;
+    return y < zero ? -angle : angle;
 }
 
 /**
@@ -61,10 +70,12 @@ template <int W, bool CLOSED> class ImplicitTwist {
     typedef Vector<Real> Vec;
 public:
     explicit ImplicitTwist(ImplicitState<W>& step) : step(step), pack(step.pack), twist(pack.twist),
-            segments(pack.segments), first(CLOSED ? 1 : 0), joints(step.joints) {
+            ofSegments(step), segments(pack.segments), first(CLOSED ? 1 : 0), joints(step.joints) {
         for (int end = 0; end < 2 && !CLOSED && twist.isPresent(); end++)
             directions[end] = {loaded<Real>(twist.directions, 3*end), loaded<Real>(twist.directions, 3*end+1),
                     loaded<Real>(twist.directions, 3*end+2)};
+        for (int i = 0; i < W && twist.isPresent(); i++)
+            isFilledUp |= pack.chain[i] >= 0 && pack.segmentsOfLane[i] < segments;
     }
     /** Describe the start of a step, draw the noise, and eliminate the turns of segments. */
     __attribute__((noinline)) void begin() {
@@ -88,22 +99,47 @@ public:
             addTurnedPairs();
         factorise();
     }
-    /** Set the forces of twist, for new nodes, and add them to the loads of these. */
-    __attribute__((noinline)) void addForces(const Vec* y) {
-        solve(y);
-        Vec* const loads = step.loads;
-        if (!step.settings.flow.present)
-            for (int node = 0; node < step.n; node++)
-                loads[node] = step.f[node];
-        for (int node = 0; node < step.n && twist.isHeld; node++)
-            step.gradient[node] = Vec {};
-        for (int s = first; s <= segments; s++) {
-            const TwistedJoint<Real>& joint = joints[s];
-            if (s > 0)
-                addGradient(joint, s-1, joint.curvature*joints[s-1].perLength);
-            if (s < segments || CLOSED)
-                addGradient(joint, s, joint.curvature*joint.perLength);
+    /**
+     * Describe the segments for new nodes, and set the forces of twist on these, to which they add what is there.
+     *
+     * @param moved  whether the nodes are elsewhere than at the start
+     */
+    __attribute__((noinline)) void addForces(const Vec* y, bool moved) {
+        haveMoved = moved;
+        if (moved)
+            solve<Moment::Iteration>(y);
+        else
+            solve<Moment::Start>(y);
+        const Vec* const others = step.settings.flow.present ? step.loads : step.f;
+        Vec force = {}, share = {}, ofJoint = {}, shareOfJoint = {};
+        if (!CLOSED)
+            findForces(0, ofJoint, shareOfJoint);
+        for (int s = 0; s < step.n; s++) {
+            Vec newForce = {}, newShare = {};
+            if (s < step.n-1) {
+                // A segment turns by the torques of both of its joints.
+                const Vec before = ofJoint, shareBefore = shareOfJoint;
+                ofJoint = shareOfJoint = Vec {};
+                if (s < segments)
+                    findForces(s+1, ofJoint, shareOfJoint);
+                const Real perLength = ofOwn(s, getSegment(s).middleInverse, Real{});
+                newForce = (before+ofJoint)*perLength;
+                newShare = (shareBefore+shareOfJoint)*perLength;
+            }
+            step.loads[s] = others[s]+newForce-force;
+            force = newForce;
+            if (twist.isHeld) {
+                step.gradient[s] = share-newShare;
+                share = newShare;
+            }
         }
+    }
+    /** A segment as addForces() has found it. */
+    CYLCHAIN_INLINE NewSegmentGeometry<Real> getSegment(int s) const {
+        if (haveMoved)
+            return joints[s].segment;
+        const IteratedSegment<Real>& start = step.segments[s];
+        return {{start.difference, start.tangent, start.length, start.inverse}, start.tangent, start.inverse};
     }
     /**
      * Let all torques of chains that are held change with the nodes: what the equations without that have found for the
@@ -114,8 +150,9 @@ public:
     template <class Equations> void shareTorque(Equations& equations, int iteration) {
         Vec* const response = step.gradient+step.n;
         Vec* const forces = response+step.n;
+        Real* const ofTensions = step.responsesOfTensions;
         if (iteration == 0)
-            equations.respond(step.gradient, response);
+            equations.respond(step.gradient, response, ofTensions);
         else if (!givesWay)
             return;
         Real found = Real{}, own = Real{};
@@ -130,17 +167,22 @@ public:
         if (!givesWay)
             return;
         const Real share = -shared*found/(1+own);
-        for (int node = 0; node < step.n; node++)
-            forces[node] = step.gradient[node]*share;
-        equations.addForces(forces);
+        if (iteration == 0)
+            equations.addResponse(response, ofTensions, share);
+        else {
+            // With the gradient for the present nodes.
+            for (int node = 0; node < step.n; node++)
+                forces[node] = step.gradient[node]*share;
+            equations.addForces(forces);
+        }
     }
     /** Add how the torque of a joint changes with the directions of its segments, to the equations of its nodes. */
     template <class Row> CYLCHAIN_INLINE void addStiffness(int s, const NewSegmentGeometry<Real>& geometry1,
             const NewSegmentGeometry<Real>& geometry2, Row& before, Row& here) const {
         const Vec t1 = geometry1.middleTangent, t2 = geometry2.middleTangent;
         // The gradient is that of the middle, which moves half as far.
-        const Vec axis = (t1+t2)*(joints[s].torque*geometry1.middleInverse*geometry2.middleInverse*
-                (0.25/(1+t1.dot(t2)+TINY)));
+        const Vec axis = (t1+t2)*(0.25*joints[s].torque*geometry1.middleInverse*geometry2.middleInverse*
+                joints[s].perCosine);
         const Matrix<Real> mixed = {{Real{}, -axis.z, axis.y}, {axis.z, Real{}, -axis.x}, {-axis.y, axis.x, Real{}}};
         before.second = before.second-mixed;
         before.upper = before.upper+mixed;
@@ -148,7 +190,7 @@ public:
     }
     /** Find how the twists have changed when the nodes have moved by y. */
     __attribute__((noinline)) void findChanges(const Vec* y, Real* changes) {
-        solve(y);
+        solve<Moment::End>(y);
         for (int s = 0; s <= segments; s++) {
             const TwistedJoint<Real>& joint = joints[s];
             changes[s] = joint.swept+joint.turnedByEnd;
@@ -162,14 +204,31 @@ private:
     ImplicitState<W>& step;
     const Pack& pack;
     const PackTwist<Scalar>& twist;
+    const SegmentEquations<W> ofSegments;
     const int segments, first;
     TwistedJoint<Real>* const joints;
     Vec directions[2];
+    /** Whether torques have been found for nodes that have moved, whose segments joints know. */
+    bool haveMoved = false;
+    /** Whether a chain is shorter than others. */
+    bool isFilledUp = false;
     /** The sum of torques when each twist changes by one; and in rings, what the elimination needs. */
     Real shared, corner, perCorner;
     /** Whether the nodes of any chain give way to its torque by so much that their equations need it. */
     bool givesWay = true;
 
+    /** A number of a segment, or in lanes where this one only fills up, another. */
+    CYLCHAIN_INLINE Real ofOwn(int s, Real value, Real other) const {
+        return isFilledUp && s < segments ?
+                (property<Real>(pack, s, Pack::InverseRestLength) > Real{} ? value : other) : value;
+    }
+    /** The direction of a segment, or behind the last one of a chain, that of its frame. */
+    CYLCHAIN_INLINE Vec directionAt(int s, const Vec& tangent) const {
+        if (!isFilledUp)
+            return tangent;
+        const Vec& frame = directions[1];
+        return {ofOwn(s, tangent.x, frame.x), ofOwn(s, tangent.y, frame.y), ofOwn(s, tangent.z, frame.z)};
+    }
     /** The segment before a joint, or at the first end of an open chain, the one behind it. */
     int before(int s) const {
         return s > 0 ? s-1 : CLOSED ? segments-1 : 0;
@@ -242,6 +301,8 @@ private:
                 joints[s].border = joints[s].turn;
             perCorner = 1/(1+joints[0].border+corner*joints[segments-1].border);
         }
+        if (!twist.isHeld)
+            return;
         for (int s = 0; s < segments; s++)
             joints[s].turn = joints[s+1].implicit-joints[jointBefore(s)].implicit;
         substitute();
@@ -280,29 +341,44 @@ private:
         for (int s = 0; s < segments; s++)
             joints[s].turn = joints[s].turn-joints[s].border*part;
     }
+    /** What torques are found for: the start of a step, or nodes in an iteration or after the last one. */
+    enum class Moment {Start, Iteration, End};
     /** Find the turns and torques for new nodes. */
-    void solve(const Vec* y) {
+    template <Moment MOMENT> void solve(const Vec* y) {
         Vec tangent = directions[0], newTangent = directions[0], middle = directions[0];
         for (int s = 0; s <= segments; s++) {
             TwistedJoint<Real>& joint = joints[s];
             const Vec before = tangent, newBefore = newTangent, middleBefore = middle;
             if (s < segments || CLOSED) {
-                const Vec difference = step.segments[s].difference, newDifference = difference+(y[s+1]-y[s]);
-                const Vec both = difference+newDifference;
-                const Real newLength = root(newDifference.dot(newDifference)), length = root(both.dot(both));
-                const Real perLengths = 1/(newLength*length);
-                tangent = step.segments[s].tangent;
-                newTangent = newDifference*(perLengths*length);
-                middle = both*(perLengths*newLength);
-                joint.perLength = 2*perLengths*newLength;
+                const IteratedSegment<Real>& start = step.segments[s];
+                tangent = directionAt(s, start.tangent);
+                if constexpr (MOMENT == Moment::Start)
+                    middle = tangent;
+                else if constexpr (MOMENT == Moment::Iteration) {
+                    ofSegments.describeNew(y, s, joint.segment);
+                    newTangent = directionAt(s, joint.segment.tangent);
+                    middle = directionAt(s, joint.segment.middleTangent);
+                }
+                else {
+                    const Vec difference = start.difference+(y[s+1]-y[s]);
+                    newTangent = directionAt(s, difference*(1/root(difference.dot(difference))));
+                }
             }
             else
                 tangent = newTangent = middle = directions[1];
             if (s < first)
                 continue;
-            joint.swept = sweptArea<Real>(before, tangent, newBefore, newTangent);
-            joint.curvature = crossProduct(middleBefore, middle)*(1/(1+middleBefore.dot(middle)+TINY));
-            joint.torque = joint.implicit*(joint.swept+joint.turnedByEnd)+joint.constant;
+            Real change = joint.turnedByEnd;
+            if constexpr (MOMENT != Moment::Start) {
+                joint.swept = sweptArea<Real>(before, tangent, newBefore, newTangent);
+                change = change+joint.swept;
+            }
+            if constexpr (MOMENT != Moment::End) {
+                joint.perCosine = 1/(1+middleBefore.dot(middle)+TINY);
+                joint.curvature = crossProduct(middleBefore, middle)*joint.perCosine;
+                joint.perCosine = ofOwn(s, joint.perCosine, Real{});
+            }
+            joint.torque = joint.implicit*change+joint.constant;
         }
         for (int s = 0; s < segments; s++)
             joints[s].turn = joints[s].random+joints[s+1].torque-joints[jointBefore(s)].torque;
@@ -312,14 +388,10 @@ private:
         for (int s = first; s <= segments; s++)
             joints[s].torque = joints[s].torque+joints[s].implicit*twistOfTurns(s);
     }
-    CYLCHAIN_INLINE void addGradient(const TwistedJoint<Real>& joint, int s, const Vec& gradient) const {
-        const Vec force = gradient*joint.torque;
-        step.loads[s] = step.loads[s]+force;
-        step.loads[s+1] = step.loads[s+1]-force;
-        if (!twist.isHeld)
-            return;
-        const Vec share = gradient*joint.share;
-        step.gradient[s] = step.gradient[s]-share;
-        step.gradient[s+1] = step.gradient[s+1]+share;
+    /** Find the force and the gradient of a joint, on either of its segments, as if that had the length one. */
+    CYLCHAIN_INLINE void findForces(int s, Vec& force, Vec& gradient) const {
+        force = joints[s].curvature*joints[s].torque;
+        if (twist.isHeld)
+            gradient = joints[s].curvature*joints[s].share;
     }
 };

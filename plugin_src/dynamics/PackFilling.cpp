@@ -66,7 +66,8 @@ void fillTwist(PackTwist<double>& twist, int lanes, int lane, const Chain& chain
     if (!twist.isPresent()) {
         for (auto* values : {&twist.stiffness, &twist.rest, &twist.angularVelocity, &twist.torque})
             values->assign((segments+1)*lanes, 0.0);
-        twist.friction.assign(segments*lanes, 1.0);
+        // What fills up does not turn.
+        twist.friction.assign(segments*lanes, 1e100);
         twist.directions.assign(6*lanes, 0.0);
     }
     for (size_t s = 0; s < segments; s++)
@@ -98,12 +99,12 @@ const ChainKernels& cylchain::bestKernels() {
 
 bool cylchain::mayShareLanes(const Chain& longest, const Chain& chain, double filling) {
     const size_t most = longest.segments.size();
-    const bool haveTwist = longest.twist.isPresent();
-    const size_t least = longest.closed || haveTwist ? most : ceil((1-filling)*most);
+    const size_t least = longest.closed ? most : ceil((1-filling)*most);
     return hasSegmentFriction(chain) == hasSegmentFriction(longest) &&
             (chain.nodeFriction > 0) == (longest.nodeFriction > 0) && chain.bending == longest.bending &&
             chain.stretching == longest.stretching && chain.closed == longest.closed &&
-            chain.planar == longest.planar && chain.twist.isPresent() == haveTwist && chain.segments.size() >= least;
+            chain.planar == longest.planar && chain.twist.isPresent() == longest.twist.isPresent() &&
+            chain.segments.size() >= least;
 }
 
 template <class Scalar> ChainPack<Scalar> cylchain::packWithoutChains(const PackShape& shape, int lanes) {

@@ -156,6 +156,22 @@ public:
             }
         }
     }
+    /** Find what nodes and tensions respond with to the right sides; those that have been found stay. */
+    void respond(Vec* moves, Real* ofTensions) {
+        std::swap(tensions, ofTensions);
+        substitute<Goal::Find>(moves, [] (int, Real) {});
+        std::swap(tensions, ofTensions);
+    }
+    /** Add a multiple of a response to what has been found. */
+    template <class Function> void addResponse(const Vec* moves, const Real* ofTensions, Real factor, Vec* y,
+            Function use) {
+        for (int node = 0; node < pack.nodes; node++)
+            y[node] = y[node]+moves[node]*factor;
+        for (int s = 0; s < pack.segments; s++) {
+            tensions[s] = tensions[s]+ofTensions[s]*factor;
+            use(s, tensions[s]);
+        }
+    }
     /**
      * Take new right sides, and none of tensions, with the same elimination.
      *

@@ -11,7 +11,6 @@
  * are no coordinates but couplings: see ImplicitCouplings.h.
  */
 
-#include "dynamics/coordinates/CoordinateKind-inl.h"
 #include "dynamics/coordinates/Lengths-inl.h"
 #include "dynamics/coordinates/Bends-inl.h"
 #include "dynamics/coordinates/AngularBends-inl.h"
