@@ -112,19 +112,22 @@ REFERENCES = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("ring", "step", "time"), [(RING, 1e4, 1e7), (RING, 1e5, 3e7), (HELD, 3e4, 2e7)])
-def test_supercoils_are_those_of_monte_carlo(ring, step, time):
+@pytest.mark.parametrize(
+    ("ring", "step", "time", "of_torque"), [(RING, 1e4, 5e7, 0.0), (RING, 1e5, 1e8, 0.05), (HELD, 3e4, 2e7, 0.05)]
+)
+def test_supercoils_are_those_of_monte_carlo(ring, step, time, of_torque):
     """Writhe, and so the torque C (2 pi/L) (Lk - Wr), in steps of 6 to 60 times the recommended one; Lk is kept.
 
-    The longest one has hard contacts. One ring in hundreds passes through itself in such steps where it has no
-    contacts, between a segment and the next but one, which are bent towards each other by twice 120 degrees.
+    The first one finds a torque that is off by 5 %. The longest one has hard contacts. One ring in hundreds passes
+    through itself in such steps where it has no contacts, between a segment and the next but one, which are bent
+    towards each other by twice 120 degrees.
     """
     copies = 48
     simulation = SupercoilSimulation(ring, regular_rings(ring, copies), 1e5, 1)
     simulation.wind(100)
     simulation.integrator.step(200)
     simulation.integrator.setStepSize(step)
-    rows, samples = np.zeros(1), 50
+    rows, samples = np.zeros(1), 100
     for _ in range(samples):
         simulation.integrator.step(round(time / samples / step))
         rows = rows + ring.observe(simulation.nodes()) / samples
@@ -138,9 +141,18 @@ def test_supercoils_are_those_of_monte_carlo(ring, step, time):
     means[0], exact[0] = ring.turns - means[0], ring.turns - exact[0]
     measured = zip(NAMES, means, errors, exact)
     lines = "\n".join(f"{name}: {mean:.5g} +- {error:.2g} of {value:.5g}" for name, mean, error, value in measured)
-    allowed = np.array([0.05, 0.05, 0.15, 0.04, 0.1, 0.05]) * exact
+    allowed = np.array([of_torque, 0.05, 0.15, 0.04, 0.1, 0.05]) * exact
     assert (np.abs(means - exact) <= allowed + 4 * errors).all(), lines
-    assert (4 * errors <= np.array([0.12, 0.15, 0.2, 0.06, 0.2, 0.2]) * exact).all(), lines
+    assert (4 * errors <= np.array([0.12 if of_torque else 0.05, 0.15, 0.2, 0.06, 0.2, 0.2]) * exact).all(), lines
+
+
+@pytest.mark.exhaustive
+def test_linking_number_is_kept_over_a_million_steps():
+    ring = replace(RING, segments=20, turns=2.5)
+    simulation = SupercoilSimulation(ring, regular_rings(ring, 1), 1e4, 1)
+    simulation.wind(100)
+    simulation.integrator.step(1_000_000)
+    assert abs(simulation.turns()[0] - ring.turns) < 1e-10
 
 
 @pytest.mark.exhaustive
