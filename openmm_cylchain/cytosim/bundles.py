@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..mechanics.geometry import regular_polygon
 from .directions import KEYS as DIRECTIONS
 from .directions import draw_direction
 from .document import EXACT, NEAREST, Note, quantity
@@ -31,16 +32,27 @@ def add_bundles(translation, new):
     at_plus = settings.text("focus", "pole", default="minus_end") in ("plus_end", "plus")
     for number in range(count):
         place, direction = _where(translation, options, number, count)
+        places = place + _aside(translation, size, direction)
         own = []
         for index in range(size):
-            own.append(
-                _add_fiber(translation, fiber, options, index, place, (-1) ** index * direction, overlap, at_plus)
-            )
+            along = (-1) ** index * direction
+            own.append(_add_fiber(translation, fiber, options, index, places[index], along, overlap, at_plus))
         # Neighbours, and the last one with the first one.
         pairs = [(first, first + 1) for first in range(size - 1)] + ([(size - 1, 0)] if size > 1 else [])
         for first, second in pairs:
             opposite = (first - second) % 2 == 1
-            _link(translation, new, own[first], own[second], opposite, overlap, stiffness, at_plus)
+            apart = float(np.linalg.norm(places[second] - places[first]))
+            _link(translation, new, own[first], own[second], opposite, overlap, stiffness, at_plus, apart)
+
+
+def _aside(translation, size, direction):
+    # Where its fibers are in a bundle across its direction: in one place, or beside each other where they would touch.
+    diameter = translation.contact_diameter
+    if diameter is None or size < 2:
+        return np.zeros((size, 3))
+    if translation.dimensions == 2:
+        return np.outer(diameter * (np.arange(size) - 0.5 * (size - 1)), np.cross([0.0, 0.0, 1.0], direction))
+    return regular_polygon(size, diameter, np.zeros(3), direction)
 
 
 def _where(translation, options, number, count):
@@ -74,7 +86,7 @@ def _add_fiber(translation, fiber, options, index, place, direction, overlap, at
     return translation.made[-1]
 
 
-def _link(translation, new, first, second, opposite, overlap, stiffness, at_plus):
+def _link(translation, new, first, second, opposite, overlap, stiffness, at_plus, apart):
     if stiffness <= 0.0:
         return
     places = [(_at(own, 0.0, at_plus), _at(own, overlap, at_plus)) for own in (first, second)]
@@ -85,7 +97,8 @@ def _link(translation, new, first, second, opposite, overlap, stiffness, at_plus
         table = translation.document.table("[[link]]", new.line)
         table.add("between", list(pair), Note(EXACT, new.name, new.line))
         table.add("stiffness", quantity(stiffness, "pN/um"))
-        table.add("rest_length", "0 um")
+        note = Note(NEAREST, "where they touch; Cytosim draws them together against it") if apart > 0.0 else None
+        table.add("rest_length", quantity(apart, "um"), note)
 
 
 def _at(made, along, at_plus):

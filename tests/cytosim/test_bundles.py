@@ -66,6 +66,25 @@ def test_rings_close_and_lengths_are_of_each_fiber(tmp_path):
     assert found.links[0].stiffness == pytest.approx(500 * PN_PER_UM)
 
 
+@pytest.mark.parametrize(("flat", "size", "apart"), [(True, 2, [1, 1]), (True, 3, [1, 1, 2]), (False, 3, [1, 1, 1])])
+def test_fibers_that_touch_are_bound_side_by_side(tmp_path, flat, size, apart):
+    """With contacts, in a row in a plane and else around a circle: links are as long as fibers are apart."""
+    text = bundle("", f"pair {{ fibers = {size}, tube, ( length = 1 ); position = 1 0 0; direction = 0 1 0 }}")
+    text = "set simul system { steric = 1, 100 }\n" + text.replace("rigidity", "steric = 1, 0.02; rigidity", 1)
+    found, document = translated(tmp_path, text.replace("steric = 1, 100", "steric = 1, 100; dim = 2") if flat else text)
+    assert document.missing == []
+    ends = ends_of(found)
+    pairs = [(own, (own + 1) % size) for own in range(size)]
+    across = ends.mean(axis=1) * [1, 0, 1]
+    np.testing.assert_allclose(across.mean(axis=0), [1, 0, 0], atol=1e-6)
+    distances = [np.linalg.norm(across[first] - across[second]) for first, second in pairs]
+    np.testing.assert_allclose(distances, 0.04 * np.array(apart), rtol=1e-6)
+    np.testing.assert_allclose([own.rest_length for own in found.links], 40.0 * np.repeat(apart, 2), rtol=1e-6)
+    simulation, built = create_simulation(found)
+    begin(found, simulation, built)
+    simulation.step(200)
+
+
 def test_bundles_that_cannot_be_said(tmp_path):
     growing = "set fiber tube { rigidity = 20; activity = grow; growing_speed = 1 }\nset fiber rod { rigidity = 20 }\n"
     text = growing + "set bundle pair { overlap = 0.2; stiffness = 500 }\nnew rod { length = 1 }\n"
