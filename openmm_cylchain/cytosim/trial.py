@@ -24,7 +24,8 @@ def try_first_steps(document, configuration, configuration_of):
     """Divide the time steps of a Document until its run takes its first steps, and say so where that was needed.
 
     As what follows may need shorter ones by chance, the next shorter one is taken after the longest that will do.
-    Contacts are turned off where that is of no help.
+    Contacts are turned off where that is of no help. Steps are too long, too, where so many of the few that there is
+    time for are divided that a run would be stopped; if shorter ones are as well, they stay as they are.
 
     Parameters
     ----------
@@ -39,9 +40,9 @@ def try_first_steps(document, configuration, configuration_of):
     str or None
         That they could not all be tried.
     """
-    trouble, unknown = _trouble(configuration)
+    trouble, untried = _trouble(configuration)
     if trouble is None:
-        return unknown
+        return untried
     tables = [own for own in document.tables if own.header in ("[simulation]", "[stage.simulation]")]
     whole = [(table, list(table.entries)) for table in tables]
     will_do = False
@@ -54,6 +55,8 @@ def try_first_steps(document, configuration, configuration_of):
         will_do = still is None
     for table, entries in whole:
         table.entries = entries
+    if untried is not None:
+        return untried
     touching = [own for own in document.tables if own.header in ("[contacts]", "[stage.contacts]")]
     whole = [(table, list(table.entries)) for table in touching]
     for table in touching:
@@ -79,13 +82,15 @@ def _divided(entry, parts):
 
 
 def _trouble(configuration):
-    # Why a run does not take its first steps, or None; and what there was no time to know, or None: sentences.
+    # Why a run does not take its first steps, or None; and what there was no time to know, or None: sentences. Steps
+    # that are slow and divided have both.
     from ..runs.created_simulation import create_simulation
     from ..runs.dry_run import STEPS_OF_STAGE, take_first_steps
     from ..runs.relaxation import relaxed_positions
     from ..runs.stages import stages_of
+    from ..time_steps.step_watch import INTOLERABLE_DIVIDED_SHARE
 
-    start, longest, slow = time.process_time(), 2.0 * _MOST_SECONDS, []
+    start, longest, slow, divided = time.process_time(), 2.0 * _MOST_SECONDS, [], 0.0
 
     def stop():
         if time.process_time() - start > longest:
@@ -104,16 +109,18 @@ def _trouble(configuration):
             for count in counts:
                 simulation.context.reinitialize()
                 simulation.context.setPositions(positions)
-                for stage, taken in take_first_steps(stages, (simulation, built), count, _MOST_SECONDS, stop):
+                for stage, taken, share in take_first_steps(stages, (simulation, built), count, _MOST_SECONDS, stop):
                     if taken is not None and taken < min(_OF_STAGE, count, stage.configuration.simulation.steps):
                         slow.append(stage.name or "the run")
+                        divided = max(divided, share)
     except (InputError, InstabilityError, OpenMMException) as error:
         return str(error), None
     except _TooLongError:
         return None, f"Its filaments overlap, and do not come apart within {longest:g} s: it may not run."
     if slow:
         names = ", ".join(list(dict.fromkeys(slow))[:_SHOWN])
-        return None, f"Not all of the first steps were tried, since they are slow: {names}."
+        trouble = f"{100 * divided:.2g} % of them are divided." if divided > INTOLERABLE_DIVIDED_SHARE else None
+        return trouble, f"Not all of the first steps were tried, since they are slow: {names}."
     return None, None
 
 

@@ -125,7 +125,7 @@ def _stages(stages, current):
     # In turn, with a few steps of each, which is to say that each can be begun.
     yield "  stages, each of which takes its first steps:"
     lasts = {stage.number: last for stage, last in named_stages(stages)}
-    for stage, _ in take_first_steps(stages, current, STEPS_OF_STAGE):
+    for stage, _, _ in take_first_steps(stages, current, STEPS_OF_STAGE):
         if not stage.is_piece:
             last = lasts[stage.number]
             count = last.number - stage.number + 1
@@ -134,7 +134,8 @@ def _stages(stages, current):
 
 
 def take_first_steps(stages, current, count, most_seconds=float("inf"), stop=None):
-    """Take a count of steps of each stage in turn, or fewer where they take long: each Stage, and how many were taken.
+    """Take a count of steps of each stage in turn, or fewer where they take long: each Stage, how many were taken, and
+    the share of those of filaments that were divided.
 
     ``current`` are the Simulation and the BuiltSystem of the first one, where it begins. Each stage has an equal share
     of the seconds of processors that are left, and one that comes again takes none: None. ``stop`` is called after each
@@ -142,7 +143,7 @@ def take_first_steps(stages, current, count, most_seconds=float("inf"), stop=Non
     """
     first, known, start = current, set(), time.process_time()
     for place, stage in enumerate(stages):
-        taken = None
+        taken, share = None, 0.0
         if id(stage.configuration) not in known:
             known.add(id(stage.configuration))
             with naming_stage(stage), located_instability(stage.configuration), steps():
@@ -151,11 +152,17 @@ def take_first_steps(stages, current, count, most_seconds=float("inf"), stop=Non
                     current = following_simulation(current, stage, first, seed, stop=stop)
                 now = time.process_time()
                 end = now + (start + most_seconds - now) / (len(stages) - place)
-                taken = 0
+                taken, before = 0, _divided_steps(current)
                 while taken < min(count, stage.configuration.simulation.steps) and time.process_time() < end:
                     current[0].step(1)
                     taken += 1
-        yield stage, taken
+                share = (_divided_steps(current) - before) / max(1, taken * len(current[1].filaments))
+        yield stage, taken, share
+
+
+def _divided_steps(current):
+    # Those of the portable engine are none.
+    return getattr(current[0].integrator, "getNumDividedSteps", lambda: 0)()
 
 
 def _cost(configuration, stages, simulation, built):

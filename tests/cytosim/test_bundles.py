@@ -6,7 +6,7 @@ import pytest
 from openmm_cylchain.errors import InputError
 from openmm_cylchain.runs.created_simulation import begin, create_simulation
 from openmm_cylchain.runs.initial_state import build_system
-from support.cytosim_files import MICROMETER, TUBE, translated
+from support.cytosim_files import MICROMETER, SYSTEM, TUBE, translated
 
 # Steps are those of Cytosim, which resolve less.
 pytestmark = pytest.mark.filterwarnings("ignore::openmm_cylchain.TimeStepWarning")
@@ -70,8 +70,9 @@ def test_rings_close_and_lengths_are_of_each_fiber(tmp_path):
 def test_fibers_that_touch_are_bound_side_by_side(tmp_path, flat, size, apart):
     """With contacts, in a row in a plane and else around a circle: links are as long as fibers are apart."""
     text = bundle("", f"pair {{ fibers = {size}, tube, ( length = 1 ); position = 1 0 0; direction = 0 1 0 }}")
-    text = "set simul system { steric = 1, 100 }\n" + text.replace("rigidity", "steric = 1, 0.02; rigidity", 1)
-    found, document = translated(tmp_path, text.replace("steric = 1, 100", "steric = 1, 100; dim = 2") if flat else text)
+    text = text.replace("rigidity", "steric = 1, 0.02; rigidity", 1)
+    system = SYSTEM.replace("dim = 3", f"steric = 1, 100; dim = {2 if flat else 3}")
+    found, document = translated(tmp_path, text, system)
     assert document.missing == []
     ends = ends_of(found)
     pairs = [(own, (own + 1) % size) for own in range(size)]

@@ -9,6 +9,7 @@ from openmm_cylchain.cytosim.command import import_file
 from openmm_cylchain.cytosim.translation import translate
 from openmm_cylchain.runs.configuration import read_configuration
 from openmm_cylchain.runs.created_simulation import begin, create_simulation
+from openmm_cylchain.runs.dry_run import take_first_steps
 from openmm_cylchain.runs.stages import stages_of
 from support.cytosim_files import CELL, RUN, SECOND, SYSTEM, TUBE, translated
 
@@ -17,6 +18,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::openmm_cylchain.TimeStepWarning
 
 FLAT = SYSTEM.replace("dim = 3", "dim = 2")
 DISC = "set space cell { shape = circle }\nnew cell { radius = 2 }\n"
+THICK = TUBE.replace("rigidity", "steric = 1, 0.02; rigidity") + "new 3 tube { length = 1 }\n"
 GROWING = "set fiber tube { rigidity = 20; activity = grow; growing_speed = 0.01; confine = inside, 1000 }\n"
 
 
@@ -270,8 +272,7 @@ def test_contacts_with_which_no_step_can_be_taken_are_turned_off(tmp_path, monke
 
     monkeypatch.setattr("openmm_cylchain.cytosim.trial._trouble", trouble)
     path, output = tmp_path / "my.cym", tmp_path / "my.toml"
-    tube = TUBE.replace("rigidity", "steric = 1, 0.02; rigidity") + "new 3 tube { length = 1 }\n"
-    path.write_text(SYSTEM.replace("dim", f"{system}; dim") + CELL + tube + RUN + change + RUN)
+    path.write_text(SYSTEM.replace("dim", f"{system}; dim") + CELL + THICK + RUN + change + RUN)
     said = import_file(path, output, trial=True)
     assert any(
         "contacts, with which the first steps have no solution, however short: Filament 0" in own for own in said
@@ -283,6 +284,35 @@ def test_contacts_with_which_no_step_can_be_taken_are_turned_off(tmp_path, monke
     assert output.read_text().count("active = false") == 1
     output.write_text(output.read_text().replace("active = false", "active = true"))
     assert stages_of(read_configuration(output))[-1].configuration.filaments[0].contact_diameter == 40
+
+
+@pytest.mark.parametrize(("longest", "parts"), [(0.3e9, 5), (0.0, 1)])
+def test_slow_steps_that_are_divided_are_shorter_where_these_are_not(tmp_path, monkeypatch, longest, parts):
+    def few_steps(stages, current, count, most_seconds, stop):
+        for stage in stages:
+            yield stage, 3, 0.2 if stage.configuration.simulation.time_step > longest else 0.05
+
+    monkeypatch.setattr("openmm_cylchain.runs.dry_run.take_first_steps", few_steps)
+    path, output = tmp_path / "my.cym", tmp_path / "my.toml"
+    path.write_text(SYSTEM.replace("dim", "steric = 1, 10; dim") + CELL + THICK + RUN)
+    said = import_file(path, output, trial=True)
+    assert "  Not all of the first steps were tried, since they are slow: the run." in said
+    assert "  left out: nothing" in said
+    assert read_configuration(output).simulation.time_step == pytest.approx(1e9 / parts)
+
+
+def test_the_share_of_divided_steps_is_that_of_each_stage(tmp_path):
+    path, output = tmp_path / "my.cym", tmp_path / "my.toml"
+    change = "change tube { rigidity = 10 }\n"
+    path.write_text(SYSTEM + CELL + TUBE + "new 3 tube { length = 1 }\n" + RUN + change + RUN)
+    import_file(path, output)
+    stages = stages_of(read_configuration(output))
+    first = create_simulation(stages[0].configuration)
+    begin(stages[0].configuration, *first)
+    counts = iter([10, 16])
+    first[0].integrator.checks = False
+    first[0].integrator.getNumDividedSteps = lambda: next(counts)
+    assert [taken[1:] for taken in take_first_steps(stages, first, 4)] == [(4, 0.5), (4, 0.0)]
 
 
 def test_first_steps_of_beads_in_a_periodic_space(tmp_path):
