@@ -7,7 +7,10 @@ using namespace OpenMM;
 using namespace cylchain;
 using namespace std;
 
-/** The skin, over the largest diameter: a list lasts longer with a larger one, but has more pairs. */
+/**
+ * The skin, over the median diameter: a list lasts longer with a larger one, but has more pairs. Over that of a large
+ * sphere, all pairs of filaments beside it would be in the list.
+ */
 static const double SKIN = 0.75;
 
 /** Pairs that are looked at by one thread at a time. */
@@ -56,16 +59,18 @@ bool ReferenceCalcCylinderChainContactForceKernel::isListValid(const vector<Vec3
 }
 
 void ReferenceCalcCylinderChainContactForceKernel::findPairs(vector<Vec3>& positions, Vec3* box) {
-    double diameter = 0;
+    vector<double> diameters;
     for (const Capsule& capsule : search->getSystem().capsules)
-        diameter = max(diameter, 2*capsule.radius);
+        diameters.push_back(2*capsule.radius);
+    const auto median = diameters.begin()+diameters.size()/2;
+    nth_element(diameters.begin(), median, diameters.end());
     hasList = false;
     const Loop run = [&] (int count, const function<void(int)>& iteration) {
         host->getLoop().run(count, iteration);
     };
     // A box that is too small for a skin may be large enough for contacts.
 
-    for (skin = SKIN*diameter; ; skin = 0)
+    for (skin = SKIN*(*median); ; skin = 0)
         try {
             search->findPairs(&positions[0][0], &positions[0][0], periodic ? &box[0][0] : NULL, skin, pairs, run);
             break;
