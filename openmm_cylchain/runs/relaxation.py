@@ -15,6 +15,7 @@ from ..kinetics.binding_force import find_binding_force, place_linkers
 from ..output.progress import LateMessages, ProgressMessages
 from ..systems.refused_context import refusal
 from ..time_steps.coupled_step import mobilities, mobilities_of_ends
+from ..time_steps.hard_contacts import longest_resolving_step
 from ..units.quantities import thermal_energy
 from .initial_state import box_vectors, build_system, contact_diameters
 
@@ -32,8 +33,11 @@ Steps at the temperature of the solvent bring back what is in equilibrium, and t
 _EXPLICIT_GROUP = 1
 _COLD, _WARM = (1e-3, 1e-2, 0.1, 0.5), (0.1, 0.5, 1.0)
 """Lengths of steps with contacts in their equations, in those of the run or, where those are longer, in recommended
-ones; in the cold only where planar filaments cross, which pushes do not take apart."""
+ones; in the cold only where planar filaments cross, which pushes do not take apart. Warm ones are as long as it takes
+to have contacts for hard ones where the run does."""
 _STEPS = 20
+_BEYOND = 1.01
+"""How long steps are that take contacts for hard ones, over the longest that do not."""
 _MOST_SHIFTS, _SHIFT = 3, 0.1
 """How often a filament is shifted that does not come apart, and how far along each axis, in diameters of contacts."""
 _LEAST_CHANCE, _MOST_ROUNDS = 3e-4, 100
@@ -50,9 +54,10 @@ def relaxed_positions(configuration, built, say=None, stop=None):
     It takes steps without linkers. In the cold, contacts push with the forces of the start of each step, which is as
     long as these allow, until none has more than 3 k_B T, or more steps bring little; so filaments that lie on each
     other may go through each other. (Where planar filaments cross, 80 steps with contacts in their equations take the
-    place of these.) 60 steps at the temperature of the solvent follow, with contacts in their equations, and more as
-    long as contacts are deeper than chance allows. A filament that would have to go through another one then is shifted
-    by a tenth of a diameter, up to three times. The result depends on the configuration alone.
+    place of these.) 60 steps at the temperature of the solvent follow, with contacts in their equations, which are hard
+    ones if those of the run are, and more as long as contacts are deeper than chance allows. A filament that would have
+    to go through another one then is shifted by a tenth of a diameter, up to three times. The result depends on the
+    configuration alone.
 
     Parameters
     ----------
@@ -141,6 +146,7 @@ def _come_apart(configuration, positions, progress, stop, begun, deleted=frozens
     )
     box = None if configuration.box is None else box_vectors(configuration.box)
     pushes = _Pushes(alone, diameters, temperature, longest, max(settings.time_step, recommended.step), box)
+    hard = _shortest_hard_step(settings, alone)
     reference = Platform.getPlatform("Reference")
     try:
         context = Context(alone.system, integrator, reference)
@@ -158,8 +164,8 @@ def _come_apart(configuration, positions, progress, stop, begun, deleted=frozens
         try:
             pushes.push(context, integrator, step)
             integrator.setTemperature(temperature)
-            _take_steps(integrator, step, [length * longest for length in _WARM])
-            integrator.setStepSize(recommended.step)
+            _take_steps(integrator, step, [max(length * longest, hard) for length in _WARM])
+            integrator.setStepSize(max(recommended.step, hard))
             rounds = 0
             while rounds < _MOST_ROUNDS and _chance_of_deepest(pushes.contacts(context), temperature) < _LEAST_CHANCE:
                 step(_STEPS)
@@ -175,6 +181,14 @@ def _come_apart(configuration, positions, progress, stop, begun, deleted=frozens
         diameter = diameters.get(number, alone.filaments[number].type.diameter)
         positions = _shifted(positions, alone.filaments, number, diameter, settings.seed, shift)
     return positions
+
+
+def _shortest_hard_step(settings, alone):
+    # Where the run takes contacts for hard ones, else 0: where many touch, steps that resolve them take far longer.
+    forces = [own for own in map(as_capsule_contact_force, alone.system.getForces()) if own is not None]
+    steps = [longest_resolving_step(alone.filaments, alone.system, own, alone.particle_friction) for own in forces]
+    longest = _BEYOND * max(steps, default=math.inf)
+    return longest if settings.scheme == "implicit" and settings.time_step >= longest else 0.0
 
 
 class _Pushes:

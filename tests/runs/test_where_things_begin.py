@@ -15,6 +15,7 @@ from openmm_cylchain.runs.keys import ConfigurationError, Place
 from openmm_cylchain.runs.relaxation import relaxed_positions
 from openmm_cylchain.runs.tables.shapes import REGION, Region
 from openmm_cylchain.systems.filaments import Filaments
+from openmm_cylchain.time_steps.hard_contacts import longest_resolving_step
 
 HEAD = '[solvent]\ntemperature = "298 K"\nviscosity = "10 mPa*s"\n'
 TAIL = '[simulation]\ntime_step = "20 us"\nduration = "20 ms"\nreport_interval = "10 ms"\nplatform = "Reference"\n'
@@ -159,8 +160,8 @@ seed = 3
 """
 
 
-def relaxed_with_count(configuration, monkeypatch):
-    """Relaxed positions, the number of steps that they took, and how many were divided, and the System."""
+def relaxed_with_steps(configuration, monkeypatch):
+    """The System, relaxed positions, the lengths of the steps that they took, and how many were divided."""
     built = build_system(configuration, configuration.simulation.engine, configuration.simulation.seed)
     integrators, steps = [], []
     make = Filaments.create_integrator
@@ -170,8 +171,8 @@ def relaxed_with_count(configuration, monkeypatch):
         return integrators[-1]
 
     monkeypatch.setattr(Filaments, "create_integrator", noted)
-    positions = relaxed_positions(configuration, built, stop=lambda: steps.append(1))._value
-    return built, positions, len(steps), integrators[0].getNumDividedSteps()
+    relaxed = relaxed_positions(configuration, built, stop=lambda: steps.append(integrators[0].getStepSize()._value))
+    return built, relaxed._value, steps, integrators[0].getNumDividedSteps()
 
 
 def contacts_at(built, positions):
@@ -185,14 +186,26 @@ def contacts_at(built, positions):
 @pytest.mark.parametrize(("kind", "radius", "contacts"), [("", "180 nm", 600), ("planar = true", "500 nm", 200)])
 def test_dense_piles_come_apart_in_few_steps(monkeypatch, kind, radius, contacts):
     configuration = parse_configuration(PILE.replace("KIND", kind).replace("180 nm", radius))
-    built, positions, steps, divided = relaxed_with_count(configuration, monkeypatch)
+    built, positions, steps, divided = relaxed_with_steps(configuration, monkeypatch)
     before, after = contacts_at(built, built.positions), contacts_at(built, positions)
     # Each filament lies on several others, some almost axis on axis. Equilibrium has less than one k_B T of each.
     assert len(before) > contacts and before.max() > 39.0 and before.sum() > 2000 > 400 > after.sum()
     assert len(after) * np.exp(-after.max()) > 3e-4
-    assert steps < 400 and divided == 0
+    assert len(steps) < 400 and divided == 0
     assert find_planar_crossing(built.filaments, None, positions) is None
     np.testing.assert_array_equal(relaxed_positions(configuration, built)._value, positions)
+
+
+@pytest.mark.parametrize("time_step", [1e3, 1e6, 1e8])
+def test_contacts_are_hard_while_piles_come_apart_if_those_of_the_run_are(monkeypatch, time_step):
+    configuration = parse_configuration(PILE.replace("KIND", "").replace("1 us", f"{1e-6 * time_step} us"))
+    built, positions, steps, divided = relaxed_with_steps(configuration, monkeypatch)
+    after = contacts_at(built, positions)
+    (force,) = filter(None, map(as_capsule_contact_force, built.system.getForces()))
+    resolving = longest_resolving_step(built.filaments, built.system, force, None)
+    assert 1e4 < resolving < 1e8
+    assert (min(steps[-60:]) > resolving) == (time_step > resolving)
+    assert divided == 0 and len(after) * np.exp(-after.max()) > 3e-4 and 400 > after.sum()
 
 
 FULL = """
