@@ -10,6 +10,7 @@ from .filaments import add_filaments
 from .places import draw_inside
 from .script import New, count_of
 from .settings import OFF, Settings
+from .simulation import contact_diameter
 
 _MOST_FIBERS = 100
 _NEEDS = "bundles of fibers that grow"
@@ -32,7 +33,7 @@ def add_bundles(translation, new):
     at_plus = settings.text("focus", "pole", default="minus_end") in ("plus_end", "plus")
     for number in range(count):
         place, direction = _where(translation, options, number, count)
-        places = place + _aside(translation, size, direction)
+        places = place + _aside(translation, fiber, size, direction)
         own = []
         for index in range(size):
             along = (-1) ** index * direction
@@ -45,9 +46,9 @@ def add_bundles(translation, new):
             _link(translation, new, own[first], own[second], opposite, overlap, stiffness, at_plus, apart)
 
 
-def _aside(translation, size, direction):
+def _aside(translation, fiber, size, direction):
     # Where its fibers are in a bundle across its direction: in one place, or beside each other where they would touch.
-    diameter = translation.contact_diameter
+    diameter = contact_diameter(translation, fiber)
     if diameter is None or size < 2:
         return np.zeros((size, 3))
     if translation.dimensions == 2:
