@@ -9,7 +9,7 @@ import numpy as np
 from .directions import KEYS as DIRECTIONS
 from .directions import UnknownDirectionError, draw_direction, draw_second_orientation, fixed_direction
 from .document import EXACT, LEFT_OUT, NEAREST, Note, Table, point, quantity
-from .filaments import add_on_body, first_length, shared_growth
+from .filaments import add_on_body, first_length, keep_longer, shared_growth
 from .places import draw_inside, draw_position, region_of, unknown_position
 from .script import count_of
 from .settings import OFF, Settings
@@ -430,6 +430,8 @@ def _add_fibers(translation, new, aster, made, outer, inner, draw):
     else:
         where, wanted = _places_of(translation, options, kind, int(number), outer, inner, draw)
     arm = min(wanted, _LEAST_SHARE * whole)
+    if growing is not None:
+        keep_longer(translation, growing, arm or 0.5 * whole)
     held = {
         "table": table,
         "end": end,

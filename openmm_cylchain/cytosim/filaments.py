@@ -14,7 +14,7 @@ from .directions import (
     draw_second_orientation,
     fixed_direction,
 )
-from .document import EXACT, NEAREST, Note, point, quantity
+from .document import EXACT, NEAREST, Note, number_in, point, quantity
 from .grammar import ScriptError
 from .growth import longest_of, read_growth, same_growth, still_growth
 from .places import draw_inside, region_of, unknown_position
@@ -294,6 +294,19 @@ def add_growth(translation, name, table, fiber, length, growing):
         inner.add("shortest", quantity(max(least, growing.monomer), "um"), Note(EXACT, "min_length", fiber.line))
     for key, value, own in growing.entries:
         inner.add(key, value, own)
+
+
+def keep_longer(translation, growing, arm):
+    """Let fibers of the last table stay as long as the arm in um by which a body keeps their direction."""
+    table = translation.document.tables_called("[filament.growth]")[-1]
+    least = growing.monomer * math.ceil(arm / growing.monomer * (1.0 - 1e-9))
+    text = "not below the second spring of the aster, where Cytosim brings it nearer"
+    longer = "shortest", quantity(least, "um"), Note(NEAREST, text)
+    place = next((k for k, (key, *_) in enumerate(table.entries) if key == "shortest"), None)
+    if place is None:
+        table.add(*longer)
+    elif number_in(table.entries[place][1]) < least:
+        table.entries[place] = longer
 
 
 def _add_shape(translation, fiber, options, points, growing):

@@ -117,6 +117,19 @@ def test_fibers_that_grow_are_held_where_their_ends_stay(tmp_path, keys, end, mi
         assert len(built_of(found).linkers) == 2
 
 
+def test_fibers_that_shrink_keep_the_springs_that_hold_them(tmp_path):
+    """Where Cytosim brings the second one nearer, they shrink to where it is at most."""
+    keys = "activity = classic; growing_speed = 0.1; shrinking_speed = -0.5; catastrophe_rate = 0.1; persistent = 1;"
+    head = HEAD.replace("rigidity = 20;", f"rigidity = 20; min_length = 0.05; {keys}")
+    text = "new star { solid = core; radius = 0.5, 0.1; fibers = 6, tube, ( length = 2; plus_end = grow ) }\n"
+    found, document = translated(tmp_path, text, head)
+    assert found.bodies[0].held.arm == pytest.approx(400.0)
+    assert 400.0 <= found.filaments[0].growth.shortest < 410.0
+    (table,) = document.tables_called("[filament.growth]")
+    (note,) = [note for key, _, note in table.entries if key == "shortest"]
+    assert str(note).startswith("nearest") and len(built_of(found).linkers) == 2
+
+
 def test_ends_of_fibers_that_touch_each_other_are_apart(tmp_path):
     head = HEAD.replace("set simul system {", "set simul system { steric = 1, 100;").replace(
         "rigidity = 20;", "rigidity = 20; steric = 1, 0.05;"

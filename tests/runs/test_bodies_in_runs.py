@@ -123,6 +123,7 @@ def test_contacts_and_walls_take_spheres():
         ("table = 2, stiff", "table = 1, stiff", "as in another"),
         ("table = 1, stiff", 'table = 1, arm = "3 um", stiff', "take a shorter one"),
         ('", arm_stiffness = "0.5 pN/nm" }', '", arm = "100 nm" }', "belongs to an arm_stiffness"),
+        ('plus_on_rate = "100', 'plus_off_rate = "1 1/s"\nplus_on_rate = "100', "may shrink to 120 nm"),
         ("table = 2, stiff", 'table = 2, end = "plus", stiff', "plus_capped = true"),
         (", minus_capped = true", "", "minus_capped = true"),
         ("count = 8", 'count = 8\nstart = "equilibrium"', "must be straight"),
@@ -151,6 +152,15 @@ def test_contacts_and_walls_take_spheres():
 def test_mistakes_are_named(old, new, message):
     with pytest.raises(InputError, match=message):
         build_system(parse_configuration(replaced((old, new))), None, 1)
+
+
+def test_arms_are_where_filaments_that_shrink_always_are():
+    """Those that are not given are as long as these may become, if that is less than a segment."""
+    shrinks = replaced(
+        ('plus_on_rate = "100', 'plus_off_rate = "1 1/s"\nplus_on_rate = "100'), (', arm = "300 nm" }', " }")
+    )
+    for text, arms in ((replaced((', arm = "300 nm" }', " }")), [250.0, 240.0]), (shrinks, [250.0, 120.0])):
+        assert [own.held.arm for own in parse_configuration(text).bodies if own.held is not None] == arms
 
 
 def test_what_has_changed_is_named():

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...filaments.body import Body, random_rotation, rotation_along
+from ...filaments.end_states import ENDS
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
 from ..table import TableKind, group_of
@@ -48,8 +49,8 @@ _HELD = TableKind(
             "arm",
             Quantity(units.LENGTH),
             None,
-            "How far along the filament the second spring is, whose place on the body is as far out; a segment if not "
-            "given.",
+            "How far along the filament the second spring is, whose place on the body is as far out, and below which "
+            "filaments must not shrink; a segment if not given, or the shortest length, if that is less.",
         ),
         Key(
             "spread",
@@ -277,12 +278,18 @@ def _held(entries, tables, groups, planar, count, points, radii, seed):
     if sum(one["table"] == table for one in others) > 1:
         raise own.at("table").error(f"is {table}, as in another [[body]] table: a filament is on one body.")
     _check_filaments(tables["filament"][table - 1], own, held, planar)
-    arm = held[0].type.segment_length if own["arm"] is None else own["arm"]
+    shrunk = min(map(_shrunk_length, held))
+    arm = min(held[0].type.segment_length, shrunk) if own["arm"] is None else own["arm"]
     if own["arm_stiffness"] is None:
         own.refuse(("arm",), "belongs to an arm_stiffness.")
-    shortest = min(_length(group) for group in held)
+    shortest = min(map(_length, held))
     if own["arm_stiffness"] is not None and arm > shortest * (1.0 + 1e-9):
         raise own.at("arm").error(f"is {arm:g} nm, but filaments are {shortest:g} nm long: take a shorter one.")
+    if own["arm_stiffness"] is not None and arm > shrunk * (1.0 + 1e-9):
+        raise own.at("arm").error(
+            f"is {arm:g} nm, but filaments may shrink to {shrunk:.6g} nm, and would lose the second spring: take a "
+            "shorter one, or a larger shortest length in their growth."
+        )
     origins, directions = _origins(entries, own, len(numbers), count, planar, np.random.default_rng(seed))
     places = list(points)
     bases = _add_points(places, len(points), origins)
@@ -342,6 +349,14 @@ def _check_filaments(entries, own, groups, planar):
 
 def _length(group):
     return float(group.type.segment_lengths(group.segments, group.closed).sum())
+
+
+def _shrunk_length(group):
+    # The least length that it may have: without growth, that which it has.
+    growth = group.growth
+    if growth is None or not any(max(growth.states(end).off_rates) > 0.0 for end in ENDS):
+        return _length(group)
+    return min(_length(group), growth.fewest_monomers(group.type) * growth.monomers.length)
 
 
 def _directions(count, spread, planar, generator):
