@@ -27,7 +27,7 @@ from .filament_shapes import (
     tangents,
 )
 from .linking import linking_number, writhe
-from .loops import ContactProbability, contact_counts, contact_probability, loop_lengths
+from .loops import ContactProbability, contact_counts, contact_probability, loop_lengths, write_cooler
 from .moduli import RelaxationModulus, relaxation_modulus
 from .networks import contact_map, contraction, filament_distances, find_bundles, mesh_size
 from .order import director, order_parameter, order_tensor
@@ -85,5 +85,6 @@ __all__ = [
     "stress",
     "tangent_correlation",
     "tangents",
+    "write_cooler",
     "writhe",
 ]

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from ..errors import InputError
-from ..units.quantities import LENGTH, positive, whole_number
+from ..output.files import check_path
+from ..units.quantities import LENGTH, positive, shown, whole_number
 from ..units.types import FloatArray, IntArray, Scalar
 from .crossings import pairs_of_points
 from .runs import Run, require_run
+
+_CHROMOSOME = re.compile("[!-9;-~]+")
 
 
 @dataclass(frozen=True)
@@ -128,6 +133,82 @@ def contact_counts(
     return result
 
 
+def write_cooler(
+    run: Run,
+    path: str | Path,
+    cutoff: Scalar,
+    base_pairs: int,
+    bin_size: int | None = None,
+    frames: range | None = None,
+    names: Sequence[str] | None = None,
+) -> None:
+    """Write the sparse map of ``contact_counts`` as a file of cooler, which programs for Hi-C read.
+
+    Filaments are chromosomes. A node stands for the segment that begins there, so that an open filament has the base
+    pairs of one segment more than it has. Counts are pairs of nodes summed over frames, the upper half of the symmetric
+    map, and not balanced; a pair within a bin counts once. The metadata have ``cutoff_nm`` and the number of
+    ``frames``. ``cooler.merge_coolers`` adds the maps of several runs. See Abdennur and Mirny, Bioinformatics 2020, 36,
+    311.
+
+    Parameters
+    ----------
+    run : Run
+        Whose filaments do not grow, and have segments of one length.
+    path : str or Path
+        Ends in ``.cool``.
+    cutoff : length
+    base_pairs : int
+        In a segment: its length over 0.34 nm for B-DNA, or those of a coarser model. Bins of cooler begin at whole
+        base pairs.
+    bin_size : int, optional
+        Base pairs in a bin, whole segments; those of one segment if not given.
+    frames : range, optional
+        Numbers of frames; all if not given.
+    names : sequence of str, optional
+        Of chromosomes, one for each filament; ``filament_0`` and so on if not given.
+
+    Raises
+    ------
+    InputError
+        As ``contact_counts``; for bins that are not whole segments, names that are not those of chromosomes, filaments
+        of more than 2^31 - 1 base pairs; and if the package cooler is not installed.
+    """
+    path = check_path(path, ".cool")
+    try:
+        import cooler
+        import pandas
+    except ImportError:
+        raise InputError("Files of cooler need the package cooler: install it by pip install cooler.") from None
+    own, cutoff, length = _frames(run, frames), positive(cutoff, LENGTH, "cutoff"), _segment_length(run)
+    largest = np.iinfo(np.int32).max
+    base_pairs = whole_number(base_pairs, 1, "base_pairs", largest)
+    size = base_pairs if bin_size is None else whole_number(bin_size, 1, "bin_size", largest)
+    if size % base_pairs:
+        raise InputError(f"bin_size must be whole segments of {base_pairs} base pairs, but is {size}.")
+    chromosomes = _chromosome_names(names, len(run.filaments))
+    ends = base_pairs * np.array([len(each.nodes) for each in run.filaments])
+    if ends.max() > largest:
+        raise InputError(f"Files of cooler have 2^31 - 1 base pairs at most, but filament {ends.argmax()} has more.")
+    starts = [np.arange(0, end, size) for end in ends]
+    bins = pandas.DataFrame(
+        {
+            "chrom": np.repeat(chromosomes, [len(each) for each in starts]),
+            "start": np.concatenate(starts),
+            "end": np.concatenate([np.append(each[1:], end) for each, end in zip(starts, ends)]),
+        }
+    )
+    upper = scipy.sparse.triu(contact_counts(run, cutoff, size // base_pairs * length, own), format="coo")
+    pixels = pandas.DataFrame({"bin1_id": upper.row, "bin2_id": upper.col, "count": upper.data})
+    metadata = {"cutoff_nm": cutoff, "frames": len(own)}
+    temporary = path.with_name(f".{path.stem}.new.cool")
+    try:
+        # By default, counts would be of 32 bits.
+        cooler.create_cooler(str(temporary), bins, pixels, dtypes={"count": np.int64}, metadata=metadata)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
 def loop_lengths(run: Run, frame: int, kind: int | None = None) -> FloatArray:
     """Lengths of the loops that linkers hold, with both hands on one filament: (loops,) array in nm.
 
@@ -168,6 +249,19 @@ def _segment_length(run):
     if len(lengths) != 1:
         raise InputError(f"Filaments must have segments of one length, but have {sorted(lengths)} nm.")
     return lengths.pop()
+
+
+def _chromosome_names(names: Sequence[str] | None, filaments: int) -> list[str]:
+    if names is None:
+        return [f"filament_{number}" for number in range(filaments)]
+    # Regions of cooler are asked for as name:start-end.
+    known = isinstance(names, Sequence) and all(isinstance(each, str) and _CHROMOSOME.fullmatch(each) for each in names)
+    if isinstance(names, str) or not known or not len(names) == len(set(names)) == filaments:
+        raise InputError(
+            f"names must be {filaments} different ones, one for each filament, of ASCII without colons and spaces, "
+            f"but are {shown(names)}."
+        )
+    return list(names)
 
 
 def _pairs_by_separation(nodes: int, ring: bool, longest: int) -> FloatArray:

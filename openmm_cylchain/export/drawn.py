@@ -1,23 +1,11 @@
-"""What exports have in common: paths, and the thickness of linkers and crosslinks."""
-
-from pathlib import Path
+"""What exports have in common: the thickness of linkers and crosslinks."""
 
 import numpy as np
 
 from ..analysis.run_filaments import RunParticles
 from ..analysis.runs import Run
-from ..errors import InputError
-from ..output.files import check_output_path
 from ..rendering.outlines import wall_lines
 from ..units.types import FloatArray
-
-
-def check_path(path: str | Path, ending: str) -> Path:
-    """The path of a file that can be written, with the ending of its format; InputError if it is not."""
-    if Path(path).suffix != ending:
-        raise InputError(f"The file must end in {ending}, but is {path}.")
-    check_output_path(path)
-    return Path(path)
 
 
 def thickness(run: Run) -> float:

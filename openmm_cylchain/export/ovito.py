@@ -8,7 +8,8 @@ import scipy
 from ..analysis.runs import Run
 from ..errors import InputError
 from ..mechanics.geometry import segment_vectors
-from .drawn import check_path, spring_labels, thickness, visible_diameter, walls
+from ..output.files import check_path
+from .drawn import spring_labels, thickness, visible_diameter, walls
 
 _ANGSTROM = 10.0  # in a nm
 _UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])

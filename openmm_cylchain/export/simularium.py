@@ -9,11 +9,11 @@ import numpy as np
 
 from ..analysis.runs import Run
 from ..mechanics.geometry import unrolled
-from ..output.files import write_atomically
+from ..output.files import check_path, write_atomically
 from ..rendering.colors import WALL_COLOR, filament_colors, linker_colors, particle_colors
 from ..units.text import time_unit
 from ..version import __version__
-from .drawn import check_path, spring_labels, thickness, visible_diameter, walls
+from .drawn import spring_labels, thickness, visible_diameter, walls
 
 _SPHERE, _FIBER = 1000.0, 1001.0
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from ..analysis.runs import Run
 from ..mechanics.geometry import unrolled
-from ..output.files import write_atomically
+from ..output.files import check_path, write_atomically
 from ..rendering.colors import WALL_COLOR, filament_colors, linker_colors, particle_colors
 from ..units.text import time_unit
-from .drawn import check_path, thickness, visible_diameter, walls
+from .drawn import thickness, visible_diameter, walls
 
 _ANGSTROM = 10.0
 _FIRST_COLOR = 17  # Those before have a meaning of their own in VMD.

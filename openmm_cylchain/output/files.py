@@ -44,3 +44,11 @@ def check_output_path(path: str | Path) -> None:
     if path.is_dir() or not path.parent.is_dir():
         what = "is a directory" if path.is_dir() else f"is in {path.parent}, which is not a directory"
         raise InputError(f"{path} {what}: give the path of a file.")
+
+
+def check_path(path: str | Path, ending: str) -> Path:
+    """The path of a file that can be written, with the ending of its format; InputError if it is not."""
+    check_output_path(path)
+    if Path(path).suffix != ending:
+        raise InputError(f"The file must end in {ending}, but is {path}.")
+    return Path(path)

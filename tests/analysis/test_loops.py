@@ -1,7 +1,9 @@
-"""P(s), sparse contact maps and loop lengths, against counts of all pairs and a closed form."""
+"""P(s), sparse contact maps, their files and loop lengths, against counts of all pairs and a closed form."""
 
 import math
+import sys
 
+import cooler
 import numpy as np
 import pytest
 import scipy
@@ -78,6 +80,62 @@ def test_contacts_against_all_pairs():
     np.fill_diagonal(sums, np.diag(sums) // 2)
     np.testing.assert_array_equal(coarse, sums)
     assert coarse.shape == (19, 19)
+
+
+def test_files_of_cooler(tmp_path):
+    """Of two chains and a ring, with bins of four segments: 8, 5 and 6."""
+    counts, path = (31, 17, 24), tmp_path / "walks.cool"
+    run = PlacedChains(random_walks(np.random.default_rng(4), counts, 3), rings=(2,))
+    analysis.write_cooler(run, path, 25.0, 59, bin_size=236, frames=range(1, 3), names=["chr1", "chr-2", "plasmid"])
+    file = cooler.Cooler(str(path))
+    dense = analysis.contact_counts(run, 25.0, bin_length=80.0, frames=range(1, 3)).toarray()
+    upper = np.triu(dense)
+    assert file.binsize == 236 and file.chromsizes.to_dict() == dict(zip(file.chromnames, 59 * np.array(counts)))
+    assert file.info["sum"] == upper.sum() and file.info["nnz"] == np.count_nonzero(upper)
+    assert file.info["metadata"] == {"cutoff_nm": 25.0, "frames": 2} and file.info["storage-mode"] == "symmetric-upper"
+    whole = file.matrix(balance=False)[:]
+    assert np.any(np.diag(whole)) and np.any(whole[:8, 8:])
+    np.testing.assert_array_equal(whole, dense)
+    np.testing.assert_array_equal(whole, whole.T)
+    np.testing.assert_array_equal(file.matrix(balance=False).fetch("chr-2:236-1003", "plasmid"), dense[9:13, 13:])
+    assert file.pixels()[:]["count"].dtype == np.int64
+    bins = file.bins()[:]
+    np.testing.assert_array_equal(bins["start"], np.concatenate([236 * np.arange(n) for n in (8, 5, 6)]))
+    assert bins["end"].tolist()[7:9] == [31 * 59, 236]
+    # Several runs, which begin with a bin for each node, over a file that is there.
+    for number, frame in enumerate(range(1, 3)):
+        analysis.write_cooler(run, tmp_path / f"{number}.cool", 25.0, 100, frames=range(frame, frame + 1))
+    cooler.merge_coolers(str(path), [str(tmp_path / f"{number}.cool") for number in range(2)], mergebuf=1000)
+    merged = cooler.Cooler(str(path))
+    assert merged.binsize == 100 and merged.chromnames == ["filament_0", "filament_1", "filament_2"]
+    expected = analysis.contact_counts(run, 25.0, frames=range(1, 3)).toarray()
+    np.testing.assert_array_equal(merged.matrix(balance=False)[:], expected)
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["0.cool", "1.cool", "walks.cool"]
+
+
+def test_files_of_cooler_are_refused(tmp_path, monkeypatch):
+    run, path = PlacedChains(random_walks(np.random.default_rng(4), (9, 5), 1)), tmp_path / "walks.cool"
+    for name, given, message in (
+        ("a.mcool", {}, "must end in .cool"),
+        ("no/a.cool", {}, "not a directory"),
+        ("a.cool", {"base_pairs": 58.8}, "base_pairs must be a whole number"),
+        ("a.cool", {"bin_size": 150}, "whole segments of 100 base pairs, but is 150"),
+        ("a.cool", {"base_pairs": 300_000_000}, "filament 0 has more"),
+        *(
+            (
+                "a.cool",
+                {"names": names},
+                "names must be 2 different ones, one for each filament, of ASCII without colons",
+            )
+            for names in (["chr1"], "ab", ["chr1"] * 2, ["chr1", "chr:2"], ["chr1", ""], ["chr1", 2], ["chr1", []], 2)
+        ),
+    ):
+        with pytest.raises(InputError, match=message):
+            analysis.write_cooler(run, tmp_path / name, 25.0, **{"base_pairs": 100, **given})
+    monkeypatch.setitem(sys.modules, "cooler", None)
+    with pytest.raises(InputError, match="pip install cooler"):
+        analysis.write_cooler(run, path, 25.0, 100)
+    assert not list(tmp_path.iterdir())
 
 
 def test_probability_of_a_gaussian_chain():

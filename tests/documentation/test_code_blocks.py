@@ -110,6 +110,7 @@ assert cli.main(["run", "staged.toml", "--output", "staged"]) == 0
 # What a page takes as given, by the page and the beginning of the block before which it runs.
 GIVEN = {
     ("docs/guide.md", "from openmm_cylchain import analysis"): RUN.replace("DIRECTORY", "output_f_actin"),
+    ("docs/kinetics.md", "from openmm_cylchain import analysis"): RUN.replace("DIRECTORY", "extruded"),
     ("docs/pictures.md", "from openmm_cylchain import analysis"): RUN.replace("DIRECTORY", "motor_network"),
     ("docs/stages.md", "from openmm_cylchain import analysis"): STAGED,
     ("docs/scans.md", "from concurrent.futures"): SCAN,
