@@ -7,6 +7,7 @@ import numpy as np
 import openmm
 import pytest
 from openmm import unit
+from scipy.linalg import eigh
 
 from openmm_cylchain import (
     F_ACTIN,
@@ -43,12 +44,14 @@ END = 4.0 * KT
 NANOSECOND = 1e3
 
 
-def in_context(filaments, step, pull=None, seed=1, platform="CPU", contacts=False, level=0):
+def in_context(filaments, step, pull=None, seed=1, platform="CPU", contacts=False, level=0, force=None):
     """A Context of filaments, which constant forces pull along z, and a FilamentsInContext.
 
     Stronger ones hold the last segment along z, where a frame may be. The level is that of the Brownian path.
     """
     _, system, positions = filaments.build()
+    if force is not None:
+        system.addForce(force)
     if pull is not None:
         force = openmm.CustomExternalForce("-pull*z")
         force.addPerParticleParameter("pull")
@@ -470,6 +473,43 @@ def test_twist_of_free_chains(step):
     assert_near(bends, 1 - theory.mean_joint_cosine(DNA, TEMPERATURE))
 
 
+def mean_square_angle_of_an_end(segments, time):
+    """By which an end of a straight chain turns: of its discrete Rouse modes, and of the whole."""
+    friction, stiffness = DNA.axial_friction(VISCOSITY), DNA.twist_stiffness
+    joints = np.diff(np.eye(segments), axis=0)
+    values, modes = np.linalg.eigh(stiffness * joints.T @ joints)
+    own = values[1:], modes[0, 1:] ** 2
+    whole = 2 * KT * time / (friction * segments)
+    return whole + np.sum(own[1] * 2 * KT / own[0] * (1 - np.exp(-own[0] * time / friction)))
+
+
+@pytest.mark.parametrize("step", [1e3, 1e2, pytest.param(1e1, marks=pytest.mark.slow)])
+def test_torsional_diffusion_of_ends(step):
+    """Of free ends, in ten of the longest steps: between joints, which relax within 1.3 ns, and the whole, 33 ns.
+
+    Chains are straight: bends turn ends by writhe as well.
+    """
+    generator = np.random.default_rng(1)
+    segments, chains, time = 16, 64, 1e4
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    for number in range(chains):
+        filaments.add_straight(
+            replace(DNA, bending_rigidity=1e5 * KT), segments, [0, 0, 100.0 * number], [1, 0, 0], clamped=[0, 1]
+        )
+    context, own = in_context(filaments, step)
+    for number in range(chains):
+        drawn = generator.normal(0.0, np.sqrt(LENGTH / 100), segments - 1)
+        own.set_twists(number, np.concatenate([[0], drawn, [0]]))
+    angles = []
+    for _ in range(161):
+        angles.append([own.twists(number)._value[[0, -1]] for number in range(chains)])
+        context.getIntegrator().step(round(time / step))
+    exact = mean_square_angle_of_an_end(segments, time)
+    long_chain = 4 * KT * np.sqrt(time / (np.pi * DNA.axial_friction(VISCOSITY) * DNA.twist_stiffness))
+    assert 0.8 < exact / long_chain < 0.9
+    assert_near((np.diff(angles, axis=0) ** 2).mean(axis=2), exact)
+
+
 def turned_by_writhe(own, filaments):
     """By how much ends with a torque have turned more than twist, over 2 pi the writhe, of each filament."""
     return [-own.twists(number)._value.sum() for number in range(len(filaments.node_indices))]
@@ -632,6 +672,74 @@ def test_straight_chain_is_unstable_beyond_a_torque(share, grows, step):
         context.getIntegrator().step(int(time / step))
         sizes.append(np.abs(positions_of(context)[20:-20, :2]).max())
     assert (sizes[1] > 2 * sizes[0]) == grows and (sizes[1] < 0.9 * sizes[0]) != grows
+
+
+def greenhill_force(segments, torque):
+    """The compression at which a hinged column buckles that torques about its axis twist: its discrete chain.
+
+    Waves exp(i kappa n) are at rest where 2 K (1 - cos kappa) = torque sin kappa + force l0; of two, whose kappa differ
+    by 2 pi/segments, the difference vanishes at both ends.
+    """
+    stiffness = DNA.bending_rigidity / LENGTH
+    return (2 * stiffness - np.cos(np.pi / segments) * np.hypot(2 * stiffness, torque)) / LENGTH
+
+
+def semitangential_force(segments, torque):
+    """The same where half of the torque follows each end, from the energy of bends, torque and compression."""
+    stiffness = DNA.bending_rigidity / LENGTH
+    slopes = np.diff(np.eye(segments + 1)[:, 1:-1], axis=0) / LENGTH
+    bends = np.diff(slopes, axis=0)
+    area = slopes[:-1].T @ slopes[1:]
+    energy = stiffness * bends.T @ bends + 0.5j * torque * (area.T - area)
+    return eigh(energy, LENGTH * slopes.T @ slopes, eigvals_only=True)[0]
+
+
+@pytest.mark.parametrize("reduced_torque", [0.0, 2.0, 4.0])
+@pytest.mark.parametrize("follows", [True, False])
+def test_hinged_column_with_torque_buckles(follows, reduced_torque):
+    """At torques of 2 and 4 A/L: growth changes its sign within 0.1 % of the force.
+
+    Frames do not turn. A hinge shares the torque between the direction of its frame and that of its segment, as a joint
+    of constant velocity does. A couple on both ends brings it to the axis: Greenhill's column.
+    """
+    segments = 20
+    length = segments * LENGTH
+    torque = reduced_torque * DNA.bending_rigidity / length
+    critical = (semitangential_force if follows else greenhill_force)(segments, torque)
+    euler = np.pi**2 * DNA.bending_rigidity / length**2
+    if not follows:
+        continuum = euler - torque**2 / (4 * DNA.bending_rigidity)
+        assert critical == pytest.approx(continuum, rel=0.01)
+    growths = []
+    for share in (0.99, 1.01):
+        filaments = Filaments(VISCOSITY, 0.0)
+        filaments.add_straight(DNA, segments, [0, 0, 0], [0, 0, 1], clamped=[0, segments])
+        for end in ("minus", "plus"):
+            filaments.add_end_frame(0, end, [0, 0, 1])
+        couple = openmm.CustomExternalForce("-push_x*x - push_y*y")
+        for name in ("push_x", "push_y"):
+            couple.addPerParticleParameter(name)
+        for node in (1, segments - 1):
+            couple.addParticle(node, [0, 0])
+        context, own = in_context(filaments, 1e6, force=couple)
+        nodes = np.arange(segments + 1)
+        start = 1e-4 * np.sin(np.pi * nodes / segments) * np.exp(0.5j * reduced_torque * nodes / segments)
+        compressed = LENGTH * (1 - share * critical / DNA.stretching_modulus)
+        context.setPositions(np.transpose([start.real, start.imag, compressed * nodes]))
+        own.set_twists(0, torque / DNA.twist_stiffness * np.array([0.5, *[1] * (segments - 1), 0.5]))
+        sizes = []
+        for _ in range(60):
+            x, y = positions_of(context)[:, :2].T
+            sizes.append(np.hypot(x, y).max())
+            if not follows:
+                for number, (node, pull) in enumerate(((1, -torque), (segments - 1, torque))):
+                    turned = 0.5 * pull / LENGTH**2 * np.array([-y[node], x[node]])
+                    couple.setParticleParameters(number, node, turned)
+                couple.updateParametersInContext(context)
+            context.getIntegrator().step(1)
+        growths.append(np.log(sizes[-1] / sizes[30]))
+    assert growths[0] < 0.0 < growths[1]
+    assert np.interp(0.0, growths, [0.99, 1.01]) == pytest.approx(1.0, abs=1e-3)
 
 
 # What is compared with
