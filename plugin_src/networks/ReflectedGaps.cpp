@@ -20,8 +20,6 @@ const double LARGEST_PULL = 10;
 const double LEAST_CHANGE_OF_GAPS = 1e-7;
 /** A gap that has just been found is pushed if its exponential variate is less than this. */
 const double LARGE_REFLECTION = 4;
-/** Gaps that a thread looks at together. */
-const int CHUNK_OF_GAPS = 64;
 
 } // namespace
 

@@ -22,15 +22,13 @@ const int SWEEPS_OF_PUSHED = 50;
  */
 const double SHARE_OF_OPENING = 1.0/3, SHARE_OF_CLOSING = 0.4;
 /** What sweeps may leave to change of a gap, over the thermal scale, or in nm where nothing moves thermally. */
-const double OF_SWEEPS = 0.01, LEAST_CHANGE = 1e-8;
+const double OF_SWEEPS = 0.01, LEAST_CHANGE_OF_SWEEPS = 1e-8;
 /** A change that is less than this share of that is not made. */
 const double LEAST_SHARE = 0.01;
 /** Sweeps are taken to change by this factor at most from one to the next. */
 const double LARGEST_RATE = 0.995;
 /** Normal numbers are not so large that their chance would be less. */
 const double LEAST_CHANCE = 1e-300;
-/** Gaps that a thread looks at together. */
-const int CHUNK_OF_GAPS = 64;
 
 /**
  * The force that reflects the motion of a gap, with an exponential variate of the mean k_B T: with its response G to a
@@ -295,7 +293,7 @@ void ReflectedMotion::findForces(const vector<GapRole>& roles, const vector<doub
         gap.isReflected = gaps[i].law == GapLaw::Reflection;
         gap.ofChains = responses.getOfChains(i);
         gap.response = gaps[i].present ? responses.getOwn(i) : 0;
-        gap.tolerance = OF_SWEEPS*getScale(i)+LEAST_CHANGE;
+        gap.tolerance = OF_SWEEPS*getScale(i)+LEAST_CHANGE_OF_SWEEPS;
         for (int side = 0; side < 2; side++)
             gap.ports[side] = responses.getPort(i, side) >= 0 ? responses.getPort(i, side) : none;
     });

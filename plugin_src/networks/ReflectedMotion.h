@@ -9,6 +9,9 @@
 
 namespace cylchain {
 
+/** Gaps that a thread looks at together. */
+const int CHUNK_OF_GAPS = 64;
+
 /** What an iteration makes of a gap: its force is found, or it shares a chain with such, or it does not. */
 enum class GapRole : char {Pushed, Beside, Apart};
 
