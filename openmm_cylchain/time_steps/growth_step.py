@@ -120,16 +120,17 @@ def refuse_countless_monomers(filaments: Sequence[Filament], step: float, box: F
 
 def _fastest_end(filaments, system):
     # Of those that may push, with what it is called.
-    pushing = set().union(*(_filaments_of(force, filaments) for force in system.getForces()))
-    grows = [(number, own) for number, own in enumerate(filaments) if own.growth is not None and number in pushing]
+    grows = [(number, own) for number, own in enumerate(filaments) if own.growth is not None]
     if not grows:
         return "", 0.0
+    pushing = set().union(*(_filaments_of(force, filaments) for force in system.getForces()))
     rates = [
         (own.growth.states(end).most_gained(own.growth.pool.concentration), f"the {end} end of filament {i}")
         for i, own in grows
+        if i in pushing
         for end in ("plus", "minus")
     ]
-    rate, label = max(rates, key=lambda one: one[0])
+    rate, label = max(rates, key=lambda one: one[0], default=(0.0, ""))
     return label, rate
 
 
