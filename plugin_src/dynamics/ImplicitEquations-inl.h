@@ -114,6 +114,10 @@ public:
         band.setForcesOnNodes(forces);
         band.respond(moves, ofTensions);
     }
+    /** See TensionBand. */
+    template <class Many> void respondToEach(const Vector<Many>* forces, Vector<Many>* moves) {
+        band.respondToEach(forces, moves);
+    }
     /** Add a multiple of that to the changes of y and of the tensions. */
     void addResponse(const Vec* moves, const Real* ofTensions, Real factor) {
         band.addResponse(moves, ofTensions, factor, change, [&] (int s, Real tension) {

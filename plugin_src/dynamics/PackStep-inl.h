@@ -61,6 +61,12 @@ public:
     void respond(const float* forces, float* moves) override {
         respondAs(forces, moves);
     }
+    void respondToEach(const double* forces, double* moves, int count, std::size_t size) override {
+        respondToEachAs(forces, moves, count, size);
+    }
+    void respondToEach(const float* forces, float* moves, int count, std::size_t size) override {
+        respondToEachAs(forces, moves, count, size);
+    }
     void findCompliances(double* compliances) override {
         step->getEquations().findResponses(UseOfResponses<W, CLOSED, true>(terms, numTerms, compliances));
     }
@@ -167,6 +173,46 @@ private:
         spreadForces(forces);
         step->getEquations().respond(forcesOnNodes, movesOfNodes);
         gatherMoves(movesOfNodes, moves);
+    }
+    template <class Number> void respondToEachAs(const Number* forces, Number* moves, int count, std::size_t size) {
+        if constexpr (W > 1)
+            PackStep::respondToEach(forces, moves, count, size);
+        else
+            // A chain alone leaves lanes for forces.
+            for (int first = 0; first < count; first += CYLCHAIN_LANES)
+                respondInLanes(forces+first*size, moves+first*size, std::min(count-first, CYLCHAIN_LANES), size);
+    }
+    template <class Number> void respondInLanes(const Number* forces, Number* moves, int count, std::size_t size) {
+        typedef typename Lanes<CYLCHAIN_LANES>::Type Many;
+        static thread_local Scratch memory;
+        // What fills up blocks of terms is on nodes behind the last one.
+        Vector<Many>* const onNodes = memory.reserve<Vector<Many> >(2*((std::size_t) pack.nodes+2));
+        Vector<Many>* const ofNodes = onNodes+pack.nodes+2;
+        std::fill(onNodes, onNodes+pack.nodes+2, Vector<Many> {});
+        for (int term = 0; term < numTerms; term++) {
+            Vector<Many> force = {};
+            for (int i = 0; i < count; i++) {
+                const Number* const own = forces+i*size;
+                lane(force.x, i) = own[TermBlocks::place(term, 0)];
+                lane(force.y, i) = own[TermBlocks::place(term, 1)];
+                if (!pack.planar)
+                    lane(force.z, i) = own[TermBlocks::place(term, 2)];
+            }
+            Vector<Many>* const at = onNodes+placed[term].first;
+            at[0] = at[0]+force*splat<Many>(placed[term].ofFirst);
+            at[1] = at[1]+force*splat<Many>(placed[term].ofSecond);
+        }
+        step->getEquations().respondToEach(onNodes, ofNodes);
+        for (int term = 0; term < numTerms; term++) {
+            const Vector<Many>* const at = ofNodes+placed[term].first;
+            Vector<Many> move = at[0]*splat<Many>(placed[term].ofFirst)+at[1]*splat<Many>(placed[term].ofSecond);
+            for (int i = 0; i < count; i++) {
+                Number* const own = moves+i*size;
+                own[TermBlocks::place(term, 0)] = lane(move.x, i);
+                own[TermBlocks::place(term, 1)] = lane(move.y, i);
+                own[TermBlocks::place(term, 2)] = lane(move.z, i);
+            }
+        }
     }
     /** Bring the records of a node into lanes, and back. */
     static CYLCHAIN_INLINE void toVector(const Record* own, Vec& vector) {

@@ -5,6 +5,7 @@
 #include "dynamics/TermBlocks.h"
 #include "mechanics/ElementHold.h"
 #include <cmath>
+#include <cstddef>
 
 namespace cylchain {
 
@@ -72,6 +73,15 @@ public:
     virtual void respond(const double* forces, double* moves) = 0;
     /** The same in single precision. */
     virtual void respond(const float* forces, float* moves) = 0;
+    /** The same for several vectors of forces, one behind the other, of which each has so many numbers. */
+    virtual void respondToEach(const double* forces, double* moves, int count, std::size_t size) {
+        for (int i = 0; i < count; i++)
+            respond(forces+i*size, moves+i*size);
+    }
+    virtual void respondToEach(const float* forces, float* moves, int count, std::size_t size) {
+        for (int i = 0; i < count; i++)
+            respond(forces+i*size, moves+i*size);
+    }
     /** Whether there may be more places than unknowns that move them, as on rigid bodies: see keepWhatMoves(). */
     virtual bool mayMoveTogether() const {
         return false;

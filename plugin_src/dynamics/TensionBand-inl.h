@@ -54,6 +54,31 @@ template <class Real> struct EliminatedRight {
     Real tension;
 };
 
+/** What elimination leaves of a chain alone, in all lanes. */
+template <class Many, class Real, bool CLOSED> CYLCHAIN_INLINE decltype(auto) inLanes(
+        const EliminatedPair<Real, CLOSED>& pair) {
+    if constexpr (std::is_same_v<Many, Real>)
+        return (pair);
+    else {
+        EliminatedPair<Many, CLOSED> result;
+        if constexpr (CLOSED)
+            for (int k = 0; k < 2; k++) {
+                result.border[k] = inLanes<Many>(pair.border[k]);
+                result.tensionBorder[k] = inLanes<Many>(pair.tensionBorder[k]);
+            }
+        result.inverse = inLanes<Many>(pair.inverse);
+        result.next = inLanes<Many>(pair.next);
+        result.second = inLanes<Many>(pair.second);
+        result.pull = inLanes<Many>(pair.pull);
+        result.first = inLanes<Many>(pair.first);
+        result.last = inLanes<Many>(pair.last);
+        result.give = inLanes<Many>(pair.give);
+        result.share = splat<Many>(pair.share);
+        result.reciprocal = splat<Many>(pair.reciprocal);
+        return result;
+    }
+}
+
 /** The equation of the tension of a segment. */
 template <class Real> struct TensionEquation {
     Vector<Real> direction;
@@ -125,36 +150,14 @@ public:
      * @param use      is called with the number of each segment and its tension, when its nodes have been found
      */
     template <Goal GOAL, class Function> CYLCHAIN_INLINE void substitute(Vec* y, Function use) {
-        Vec next = {}, second = {};
-        Real tension = {};
-        if constexpr (CLOSED) {
-            const Vec found1 = rights[1].solution;
-            const Real tension0 = rights[1].tension;
-            const Vec found0 = rights[0].solution-nodes[0].next*found1+nodes[0].pull*tension0;
-            const Real tensionLast = rights[0].tension+nodes[0].first.dot(found1)+nodes[0].share*tension0;
-            if (GOAL != Goal::Nodes) {
-                tensions[0] = GOAL == Goal::Add ? tensions[0]+tension0 : tension0;
-                tensions[n-1] = GOAL == Goal::Add ? tensions[n-1]+tensionLast : tensionLast;
-            }
-            tension = tensionLast;
-            y[0] = GOAL == Goal::Add ? y[0]+found0 : found0;
-            y[1] = GOAL == Goal::Add ? y[1]+found1 : found1;
-            y[n] = y[0];
-            y[n+1] = y[1];
-            for (int node = n-1; node > 1; node--) {
-                substitutePair<GOAL>(node, found0, found1, next, second, tension, y);
-                use(node, tensions[node]);
-            }
-            use(1, tensions[1]);
-            use(0, tensions[0]);
-        }
-        else {
-            substitutePair<GOAL>(n-1, next, next, next, second, tension, y);
-            for (int node = n-2; node >= 0; node--) {
-                substitutePair<GOAL>(node, next, next, next, second, tension, y);
-                use(node, tensions[node]);
-            }
-        }
+        substitute<GOAL>(y, rights, use);
+    }
+    /** Find how forces on nodes move these, many of them on one chain alone: each in a lane of its own. */
+    template <class Many> void respondToEach(const Vector<Many>* forces, Vector<Many>* moves) {
+        static thread_local Scratch ofRights;
+        EliminatedRight<Many>* const each = ofRights.template reserve<EliminatedRight<Many> >(n);
+        setForcesOnNodes(forces, each);
+        substitute<Goal::Nodes>(moves, each, [] (int, Real) {});
     }
     /** Find what nodes and tensions respond with to the right sides; those that have been found stay. */
     void respond(Vec* moves, Real* ofTensions) {
@@ -185,7 +188,8 @@ public:
             ofBorder[1] = force1-force0;
             forceBefore = force1;
         }
-        setRightSides(ofBorder, [&] (int node, Vec right) {
+        takeWorkspace();
+        setRightSides(ofBorder, rights, [&] (int node, Vec right) {
             right = right-forceBefore;
             if (CLOSED || node < n-1) {
                 forceBefore = forceOf(node);
@@ -196,11 +200,8 @@ public:
     }
     /** The same with a force on each node. Those on the first two nodes of a ring may come a second time behind it. */
     CYLCHAIN_INLINE void setForcesOnNodes(const Vec* forces) {
-        Vec ofBorder[2] = {};
-        if constexpr (CLOSED)
-            for (int k = 0; k < 2; k++)
-                ofBorder[k] = forces[k]+forces[n+k];
-        setRightSides(ofBorder, [&] (int node, const Vec& right) {return right+forces[node];});
+        takeWorkspace();
+        setForcesOnNodes(forces, rights);
     }
     /** Ask for the memory that begins an elimination, and what comes with it. */
     void prefetchElimination() const {
@@ -236,15 +237,24 @@ private:
         equations = ofEquations.template reserve<TensionEquation<Real> >(n);
     }
 
+    template <class Many> CYLCHAIN_INLINE void setForcesOnNodes(const Vector<Many>* forces,
+            EliminatedRight<Many>* rights) {
+        Vector<Many> ofBorder[2] = {};
+        if constexpr (CLOSED)
+            for (int k = 0; k < 2; k++)
+                ofBorder[k] = forces[k]+forces[n+k];
+        setRightSides(ofBorder, rights, [&] (int node, const Vector<Many>& right) {return right+forces[node];});
+    }
     /** Begin the border of a ring with some right sides; a function adds what others have to what is there. */
-    template <class Function> CYLCHAIN_INLINE void setRightSides(Vec* ofBorder, Function added) {
-        takeWorkspace();
+    template <class Many, class Function> CYLCHAIN_INLINE void setRightSides(Vector<Many>* ofBorder,
+            EliminatedRight<Many>* rights, Function added) {
+        typedef Vector<Many> Vec;
         Vec here = {}, next = {};
-        Real start = {};
+        Many start = {};
         for (int node = CLOSED ? 2 : 0; node < n; node++) {
-            const EliminatedPair<Real, CLOSED>& own = nodes[node];
             if (node+2 < n)
                 prefetch(&nodes[node+2]);
+            decltype(auto) own = inLanes<Many>(nodes[node]);
             const Vec right = added(node, here);
             rights[node] = {own.inverse*right-own.give*start, own.reciprocal*start+own.give.dot(right)};
             if constexpr (CLOSED)
@@ -259,12 +269,13 @@ private:
         }
         if constexpr (CLOSED) {
             auto setRight = [&] (int node, const Vec& right) {
-                rights[node] = {nodes[node].inverse*right-nodes[node].give*start,
-                        nodes[node].reciprocal*start+nodes[node].give.dot(right)};
+                decltype(auto) own = inLanes<Many>(nodes[node]);
+                rights[node] = {own.inverse*right-own.give*start, own.reciprocal*start+own.give.dot(right)};
             };
             setRight(0, ofBorder[0]);
-            const Vec right = ofBorder[1]-nodes[0].next.transposedTimes(ofBorder[0])-nodes[0].first*start;
-            start = nodes[0].share*start-nodes[0].pull.dot(ofBorder[0]);
+            decltype(auto) own = inLanes<Many>(nodes[0]);
+            const Vec right = ofBorder[1]-own.next.transposedTimes(ofBorder[0])-own.first*start;
+            start = own.share*start-own.pull.dot(ofBorder[0]);
             setRight(1, right);
         }
     }
@@ -366,11 +377,50 @@ private:
         border[0].upper = border[0].upper-row.border[0].transposedTimes(result.border[1])+
                 Mat::outer(before.border[0], result.tensionBorder[1]);
     }
-    template <Goal GOAL> CYLCHAIN_INLINE void substitutePair(int node, const Vec& found0, const Vec& found1, Vec& next,
-                Vec& second, Real& tension, Vec* y) {
-        const EliminatedPair<Real, CLOSED>& own = nodes[node];
-        Vec here = rights[node].solution;
-        Real found = rights[node].tension;
+    template <Goal GOAL, class Many, class Function> CYLCHAIN_INLINE void substitute(Vector<Many>* y,
+                const EliminatedRight<Many>* rights, Function use) {
+        constexpr bool WITH_TENSIONS = GOAL != Goal::Nodes;
+        Vector<Many> next = {}, second = {};
+        Many tension = {};
+        if constexpr (CLOSED) {
+            decltype(auto) own = inLanes<Many>(nodes[0]);
+            const Vector<Many> found1 = rights[1].solution;
+            const Many tension0 = rights[1].tension;
+            const Vector<Many> found0 = rights[0].solution-own.next*found1+own.pull*tension0;
+            const Many tensionLast = rights[0].tension+own.first.dot(found1)+own.share*tension0;
+            if constexpr (WITH_TENSIONS) {
+                tensions[0] = GOAL == Goal::Add ? tensions[0]+tension0 : tension0;
+                tensions[n-1] = GOAL == Goal::Add ? tensions[n-1]+tensionLast : tensionLast;
+            }
+            tension = tensionLast;
+            y[0] = GOAL == Goal::Add ? y[0]+found0 : found0;
+            y[1] = GOAL == Goal::Add ? y[1]+found1 : found1;
+            y[n] = y[0];
+            y[n+1] = y[1];
+            for (int node = n-1; node > 1; node--) {
+                substitutePair<GOAL>(node, rights[node], found0, found1, next, second, tension, y);
+                if constexpr (WITH_TENSIONS)
+                    use(node, tensions[node]);
+            }
+            if constexpr (WITH_TENSIONS) {
+                use(1, tensions[1]);
+                use(0, tensions[0]);
+            }
+        }
+        else
+            for (int node = n-1; node >= 0; node--) {
+                substitutePair<GOAL>(node, rights[node], next, next, next, second, tension, y);
+                if constexpr (WITH_TENSIONS)
+                    if (node < n-1)
+                        use(node, tensions[node]);
+            }
+    }
+    template <Goal GOAL, class Many> CYLCHAIN_INLINE void substitutePair(int node, const EliminatedRight<Many>& right,
+                const Vector<Many>& found0, const Vector<Many>& found1, Vector<Many>& next, Vector<Many>& second,
+                Many& tension, Vector<Many>* y) {
+        decltype(auto) own = inLanes<Many>(nodes[node]);
+        Vector<Many> here = right.solution;
+        Many found = right.tension;
         if (CLOSED || node < n-1) {
             here = here-own.next*next-own.second*second+own.pull*tension;
             found = found+own.first.dot(next)+own.last.dot(second)+own.share*tension;
@@ -380,8 +430,9 @@ private:
             found = found+own.tensionBorder[0].dot(found0)+own.tensionBorder[1].dot(found1);
         }
         y[node] = GOAL == Goal::Add ? y[node]+here : here;
-        if (node > 0 && GOAL != Goal::Nodes)
-            tensions[node-1] = GOAL == Goal::Add ? tensions[node-1]+found : found;
+        if constexpr (GOAL != Goal::Nodes)
+            if (node > 0)
+                tensions[node-1] = GOAL == Goal::Add ? tensions[node-1]+found : found;
         tension = found;
         second = next;
         next = here;

@@ -131,3 +131,12 @@ template <class Real> inline Symmetric<Real> inverseOfMobile(Symmetric<Real> dia
     diagonal.zz += held;
     return diagonal.inverse(mobile);
 }
+
+/** A matrix of one lane in all lanes. */
+template <class Many, class Real> CYLCHAIN_INLINE Matrix<Many> inLanes(const Matrix<Real>& m) {
+    return {inLanes<Many>(m.x), inLanes<Many>(m.y), inLanes<Many>(m.z)};
+}
+template <class Many, class Real> CYLCHAIN_INLINE Symmetric<Many> inLanes(const Symmetric<Real>& m) {
+    return {splat<Many>(m.xx), splat<Many>(m.yx), splat<Many>(m.yy), splat<Many>(m.zx), splat<Many>(m.zy),
+            splat<Many>(m.zz)};
+}

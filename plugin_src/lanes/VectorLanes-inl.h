@@ -68,6 +68,11 @@ template <class Real> CYLCHAIN_INLINE Vector<Real> crossProduct(const Vector<Rea
     return {a.y*b.z-a.z*b.y, a.z*b.x-a.x*b.z, a.x*b.y-a.y*b.x};
 }
 
+/** A vector of one lane in all lanes. */
+template <class Many, class Real> CYLCHAIN_INLINE Vector<Many> inLanes(const Vector<Real>& v) {
+    return {splat<Many>(v.x), splat<Many>(v.y), splat<Many>(v.z)};
+}
+
 #include "lanes/Matrix-inl.h"
 
 /** Memory that a thread keeps between calls, aligned for vector registers. */

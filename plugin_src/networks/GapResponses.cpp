@@ -18,6 +18,8 @@ const double LEAST_PIVOT = 1e-6;
 const double LARGEST_CONTRADICTION = 1e-3;
 /** Rows are longer than needed by this share, so that most gaps that are added find room. */
 const double ROOM_OF_ROWS = 0.25;
+/** Ports of a chain whose responses are found together: a chain that is alone in its pack does so in lanes. */
+const int PORTS_TOGETHER = 8;
 /** Gaps that a thread looks at together. */
 const int CHUNK_OF_PORTS = 256;
 
@@ -160,8 +162,8 @@ template <class Number> void GapResponses::findOfPack(const vector<Gap>& gaps, c
     auto placeOf = [&] (size_t equation, int side) {
         return TermBlocks::place(coupled.getTerm(equation, side)-coupled.firstTerm(pack), 0);
     };
-    force.assign(size, Number(0));
-    move.resize(size);
+    force.assign(PORTS_TOGETHER*size, Number(0));
+    move.resize(PORTS_TOGETHER*size);
     terms.clear();
     firstTerms.clear();
     firstOfChain.clear();
@@ -183,37 +185,33 @@ template <class Number> void GapResponses::findOfPack(const vector<Gap>& gaps, c
         }
     }
     firstTerms.push_back(terms.size());
-    for (int round = 0; round < rounds; round++) {
-        auto forTermsOfRound = [&] (auto function) {
-            for (size_t i = 0; i < chainsOfPack.size(); i++) {
-                const ChainPorts& own = chains[chainsOfPack[i]];
-                if (own.known+round < own.count()) {
-                    const int* const first = &firstTerms[firstOfChain[i]+own.known+round];
-                    for_each(&terms[first[0]], &terms[0]+first[1], function);
+    for (int firstRound = 0; firstRound < rounds; firstRound += PORTS_TOGETHER) {
+        const int count = min(PORTS_TOGETHER, rounds-firstRound);
+        auto forPortsOfRounds = [&] (auto function) {
+            for (int i = 0; i < count; i++)
+                for (size_t number = 0; number < chainsOfPack.size(); number++) {
+                    ChainPorts& own = chains[chainsOfPack[number]];
+                    const int port = own.known+firstRound+i;
+                    if (port < own.count())
+                        function(own, chainsOfPack[number], &firstTerms[firstOfChain[number]], port, i*size);
                 }
-            }
         };
-        forTermsOfRound([&] (const TermOfPort& term) {
-            for (int k = 0; k < 3; k++)
-                force[term.place+STRIDE*k] = term.gradient[k];
-        });
-        step.respond(force.data(), move.data());
-        forTermsOfRound([&] (const TermOfPort& term) {
-            for (int k = 0; k < 3; k++)
-                force[term.place+STRIDE*k] = 0;
-        });
-        for (size_t i = 0; i < chainsOfPack.size(); i++) {
-            const int chain = chainsOfPack[i];
-            ChainPorts& own = chains[chain];
-            const int port = own.known+round;
-            if (port >= own.count())
-                continue;
+        auto setForces = [&] (Number scale) {
+            forPortsOfRounds([&] (ChainPorts&, int, const int* first, int port, size_t begin) {
+                for (int term = first[port]; term < first[port+1]; term++)
+                    for (int k = 0; k < 3; k++)
+                        force[begin+terms[term].place+STRIDE*k] = scale*terms[term].gradient[k];
+            });
+        };
+        setForces(1);
+        step.respondToEach(force.data(), move.data(), count, size);
+        setForces(0);
+        forPortsOfRounds([&] (ChainPorts& own, int chain, const int* first, int port, size_t begin) {
             double* const row = &own.responses[(size_t) port*own.stride];
             for (int other = 0; other <= port; other++) {
-                const int* const first = &firstTerms[firstOfChain[i]+other];
                 Number sum = 0;
-                for (int k = first[0]; k < first[1]; k++) {
-                    const Number* const at = &move[terms[k].place];
+                for (int k = first[other]; k < first[other+1]; k++) {
+                    const Number* const at = &move[begin+terms[k].place];
                     const Number* const gradient = terms[k].gradient;
                     sum += gradient[0]*at[0]+gradient[1]*at[STRIDE]+gradient[2]*at[2*STRIDE];
                 }
@@ -221,11 +219,11 @@ template <class Number> void GapResponses::findOfPack(const vector<Gap>& gaps, c
             }
             double* to = &own.movesOfLinks[port];
             for (const LinkYielding::Side* side = links.begin(chain); side != links.end(chain); side++) {
-                const Number* const at = &move[placeOf(links.getLinks()[side->link].equation, side->side)];
+                const Number* const at = &move[begin+placeOf(links.getLinks()[side->link].equation, side->side)];
                 for (int k = 0; k < 3; k++, to += own.stride)
                     *to = at[STRIDE*k];
             }
-        }
+        });
     }
     for (int chain : chainsOfPack) {
         ChainPorts& own = chains[chain];

@@ -9,9 +9,8 @@ using namespace std;
 
 namespace {
 
-const int NEWTON_ITERATIONS = 30;
-/** The same where links turn, which several of them at one place do slowly. */
-const int NEWTON_ITERATIONS_OF_TURNING_LINKS = 50;
+/** Several links that turn at one place do so slowly, as do contacts of plectonemes that slide. */
+const int NEWTON_ITERATIONS = 50;
 /**
  * Contacts that open and close in turn keep Newton's method from ending. After so many iterations, only this share of
  * each change is made.
@@ -278,8 +277,7 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
         demands.demandingStiffness = max(demands.demandingStiffness, own->getDemandingStiffness());
         demands.tolerance = min(demands.tolerance, own->getRelativeTolerance());
     }
-    const int most = turns ? NEWTON_ITERATIONS_OF_TURNING_LINKS : NEWTON_ITERATIONS;
-    for (int iteration = 0; iteration < most; iteration++) {
+    for (int iteration = 0; iteration < NEWTON_ITERATIONS; iteration++) {
         equations.clear();
         for (size_t i = 0; i < couplings.size(); i++) {
             first[i] = equations.size();

@@ -122,6 +122,25 @@ public:
         }
         return (starts[0]*ends[0]-starts[1]*ends[1])/(forces[1]*ends[1]-forces[0]*ends[0]);
     }
+    /** Check that forces on all terms of a pack that are given together move these as each by itself. */
+    void checkResponsesTogether() {
+        for (size_t pack = 0; pack < packs.size(); pack++) {
+            const int terms = coupled.countTerms(pack);
+            const size_t size = 3*TermBlocks::fill(terms);
+            Array forces(3*terms*size), moves(forces.size()), move(size);
+            for (int i = 0; i < 3*terms; i++)
+                forces[i*size+TermBlocks::place(i/3, i%3)] = 1;
+            packs[pack]->respondToEach(forces.data(), moves.data(), 3*terms, size);
+            for (int i = 0; i < 3*terms; i++) {
+                packs[pack]->respond(forces.data()+i*size, move.data());
+                for (int k = 0; k < 3*terms; k++) {
+                    const int place = TermBlocks::place(k/3, k%3);
+                    check(fabs(moves[i*size+place]-move[place]) <= 1e-9*fabs(move[TermBlocks::place(i/3, i%3)]),
+                            "forces that are given together move places as each by itself");
+                }
+            }
+        }
+    }
     /** The same from a dense solution of all linear equations. */
     double findExactResponse(const vector<TestLink>& links, const TestGap& gap) {
         // How all places move without links.
@@ -150,6 +169,7 @@ public:
                 if (packOf(to/3) == pack)
                     mobility[to][from] = move[TermBlocks::place(termOf(to/3)-first, to%3)];
         }
+        checkResponsesTogether();
         // (1+C S^T K S) move = C f.
         vector<Array> matrix(3*numPlaces, Array(3*numPlaces));
         Array moves(3*numPlaces);
