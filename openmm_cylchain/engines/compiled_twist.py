@@ -11,16 +11,17 @@ from ..filaments.twist import FILAMENT_ENDS
 def set_end_frame(force, filament, frame):
     """Give a CylinderChainForce the frame beyond an end of a Filament: an EndFrame.
 
-    Half a segment of material is between the frame of the last segment and an end that is held.
+    Half a segment of material is between the frame of the last segment and one that is held, or has a friction.
     """
-    held = frame.torque is None
+    has_joint = frame.is_held or frame.rotational_friction is not None
     force.setEndFrame(
         frame.filament,
         FILAMENT_ENDS.index(frame.end),
         openmm.Vec3(*frame.direction),
-        2.0 * filament.type.twist_stiffness if held else 0.0,
-        0.0 if held else frame.torque,
+        2.0 * filament.type.twist_stiffness if has_joint else 0.0,
+        frame.torque or 0.0,
         frame.angular_velocity,
+        frame.rotational_friction or 0.0,
     )
 
 

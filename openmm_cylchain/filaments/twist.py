@@ -8,7 +8,17 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..units.quantities import DIMENSIONLESS, ENERGY, RATE, finite_number, one_of, vector, whole_number
+from ..units.quantities import (
+    DIMENSIONLESS,
+    ENERGY,
+    RATE,
+    ROTATIONAL_FRICTION,
+    finite_number,
+    one_of,
+    positive,
+    vector,
+    whole_number,
+)
 
 FILAMENT_ENDS = ("minus", "plus")
 """Of the first and of the last node, as numbers 0 and 1."""
@@ -26,9 +36,11 @@ class EndFrame:
     direction : tuple of three floats
         Where the filament would go on, or has come from: a unit vector from minus to plus.
     torque : float or None
-        On a frame that turns freely about the direction, in kJ/mol; None if the frame is held.
+        On a frame that turns about the direction, in kJ/mol; None if there is none.
     angular_velocity : float
         Of a frame that is held, about the direction, in radians/ps.
+    rotational_friction : float or None
+        Of a frame that turns against it, in kJ ps/mol.
     """
 
     filament: int
@@ -36,6 +48,12 @@ class EndFrame:
     direction: tuple[float, float, float]
     torque: float | None = None
     angular_velocity: float = 0.0
+    rotational_friction: float | None = None
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the frame turns as fast as it is told."""
+        return self.torque is None and self.rotational_friction is None
 
     def __post_init__(self) -> None:
         label = "End frame"
@@ -50,8 +68,14 @@ class EndFrame:
             object.__setattr__(self, "torque", finite_number(self.torque, ENERGY, f"{label}: torque"))
         velocity = finite_number(self.angular_velocity, RATE, f"{label}: angular_velocity")
         object.__setattr__(self, "angular_velocity", velocity)
-        if self.torque is not None and velocity != 0.0:
-            raise InputError(f"{label}: give a torque to a frame that turns freely, or an angular velocity, not both.")
+        if self.rotational_friction is not None:
+            friction = positive(self.rotational_friction, ROTATIONAL_FRICTION, f"{label}: rotational_friction")
+            object.__setattr__(self, "rotational_friction", friction)
+        if velocity != 0.0 and not self.is_held:
+            raise InputError(
+                f"{label}: an angular_velocity is that of a frame that is held: give it no torque and no "
+                "rotational_friction, or give those alone."
+            )
 
 
 def end_number(end: str, label: str) -> int:

@@ -226,7 +226,12 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None, dele
         with entries.naming():
             for number in own.filaments:
                 filaments.add_end_frame(
-                    number, own.end, own.direction, torque=own.torque, angular_velocity=own.angular_velocity
+                    number,
+                    own.end,
+                    own.direction,
+                    torque=own.torque,
+                    angular_velocity=own.angular_velocity,
+                    rotational_friction=own.rotational_friction,
                 )
     for own, entries in zip(configuration.linkers if kinetics else (), configuration.tables["linkers"]):
         anchors = _anchors(own, configuration, filaments)

@@ -385,7 +385,7 @@ class FilamentsInContext:
         number = self._twisted(filament)
         side = end_number(end, "turn_end: end")
         frames = [own for own in self._placed.end_frames if (own.filament, own.end) == (number, end)]
-        if not frames or frames[0].torque is not None:
+        if not frames or not frames[0].is_held:
             raise InputError(f"The {end} end of filament {number} has no frame that is held: add it by add_end_frame.")
         twists = twists_of(self._context, number)
         twists[-1 if side else 0] += finite_number(angle, ANGLE, "angle") * (1 if side else -1)

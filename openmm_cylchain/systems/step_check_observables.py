@@ -2,7 +2,7 @@
 
 import copy
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -41,10 +41,11 @@ def _kinds(filaments):
     groups: dict[Any, list[int]] = {}
     frames: dict[int, list[Any]] = {}
     for own in filaments.end_frames:
-        frames.setdefault(own.filament, []).append((own.end, own.direction, own.torque, own.angular_velocity))
+        frames.setdefault(own.filament, []).append(own)
     for number, one in enumerate(filaments):
         key = (one.type, one.segments, one.closed, one.planar, one.clamped, one.clamped_tangents, one.propulsion)
-        key += tuple(sorted(frames.get(number, []), key=lambda frame: frame[0]))
+        own_frames = sorted(frames.get(number, []), key=lambda frame: frame.end)
+        key += tuple(replace(frame, filament=0) for frame in own_frames)
         groups.setdefault(key, []).append(number)
     kinds: list[Kind] = []
     for numbers in groups.values():

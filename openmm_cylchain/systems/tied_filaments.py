@@ -125,6 +125,7 @@ class TiedFilaments(AddedFilaments):
         *,
         torque: Scalar | None = None,
         angular_velocity: Scalar = 0.0,
+        rotational_friction: Scalar | None = None,
     ) -> None:
         """Bind the material at an end of a filament with twist to a frame beyond it, such as that of a magnetic bead.
 
@@ -132,6 +133,12 @@ class TiedFilaments(AddedFilaments):
         against twist, which does not bend. So an end that is held keeps its turns, whatever the filament does, and the
         linking number of a filament that is held at both ends is kept, if clamped nodes or forces keep its ends near to
         the directions. An end without a frame is free.
+
+        A frame with a rotational_friction Z is a bead that turns by psi, with the twist m of that joint and its noise:
+
+            Z dpsi/dt = torque + noise -(2C/l0) m at a plus end, + (2C/l0) m at a minus end,
+
+        of first order in the step, and in equilibrium at any step.
 
         Parameters
         ----------
@@ -143,14 +150,18 @@ class TiedFilaments(AddedFilaments):
             From minus to plus, where the filament would go on beyond its plus end, or has come from at its minus end.
             It does not change, and need not be normalised.
         torque : energy, optional
-            A torque about the direction on a frame that turns freely about it. The frame is held if none is given.
+            A torque about the direction on a frame that turns about it. The frame is held if neither a torque nor a
+            rotational_friction is given. Without a friction, it turns with the last segment.
         angular_velocity : angle/time
             How fast a frame that is held turns about the direction; radians/ps if a plain number.
+        rotational_friction : energy time, optional
+            Of a frame that turns against it, such as a bead: pi eta d**3 of a sphere about its middle.
 
         Raises
         ------
         InputError
-            For a filament or an end that does not exist, a ring, a filament without twist, or a second frame.
+            For a filament or an end that does not exist, a ring, a filament without twist, a second frame, a friction
+            that is not positive, or an angular velocity of a frame that is not held.
 
         Examples
         --------
@@ -165,7 +176,14 @@ class TiedFilaments(AddedFilaments):
             raise InputError(f"{label}: filament {number} has no twist: give its type a twist_persistence_length.")
         if own.closed:
             raise InputError(f"{label}: filament {number} is a ring, and has no ends.")
-        frame = EndFrame(number, end, direction, torque, angular_velocity)  # type: ignore[arg-type]
+        frame = EndFrame(
+            number,
+            end,
+            direction,  # type: ignore[arg-type]
+            torque,  # type: ignore[arg-type]
+            angular_velocity,  # type: ignore[arg-type]
+            rotational_friction,  # type: ignore[arg-type]
+        )
         if any(other.filament == number and other.end == end for other in self._end_frames):
             raise InputError(f"{label}: the {end} end of filament {number} has a frame already.")
         self._end_frames.append(frame)

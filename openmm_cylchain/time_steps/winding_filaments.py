@@ -21,7 +21,7 @@ def warn_of_winding_filaments(filaments: FilamentCollection, constant_forces: Ma
     The filament has a frame that is held at its other end, and is pulled by constant forces, (3,) in kJ/(mol nm), which
     are by the particle that they act on. The tension is that of most of its segments.
     """
-    held = {(own.filament, own.end) for own in filaments.end_frames if own.torque is None}
+    held = {(own.filament, own.end) for own in filaments.end_frames if own.is_held}
     for frame in filaments.end_frames:
         number, filament = frame.filament, filaments[frame.filament]
         other = "minus" if frame.end == "plus" else "plus"

@@ -37,7 +37,9 @@ double TwistedContour::torqueOf(int joint) const {
     if (joint > 0 && joint < count)
         return twist.stiffness[joint-1]*twistOf(joint);
     const EndFrame& frame = twist.ends[joint == 0 ? 0 : 1];
-    return frame.stiffness*twists[joint]+(joint == 0 ? -frame.torque : frame.torque);
+    if (frame.stiffness > 0)
+        return frame.stiffness*twists[joint];
+    return joint == 0 ? -frame.torque : frame.torque;
 }
 
 double TwistedContour::findTorque(double position, double range) const {

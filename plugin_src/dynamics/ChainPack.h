@@ -20,12 +20,16 @@ template <class Scalar> struct PackTwist {
      * that is there in any case. The last two are those of end frames.
      */
     std::vector<Scalar> stiffness, rest, angularVelocity, torque;
+    /** The same of the friction of an end frame; 1e100 where none turns. */
+    std::vector<Scalar> frameFriction;
     /** Of each segment, [segment][lane]; nothing if chains have no twist. */
     std::vector<Scalar> friction;
     /** The directions of end frames, [end][axis][lane]. */
     std::vector<Scalar> directions;
-    /** Whether any chain is held at both ends, or is closed, so that all of it shares a torque. */
+    /** Whether any chain has a frame at both ends, or is closed, so that all of it shares a torque. */
     bool isHeld = false;
+    /** Whether a frame turns against a friction. */
+    bool hasTurningFrames = false;
     bool isPresent() const {
         return !friction.empty();
     }

@@ -36,8 +36,9 @@ template <class Real> struct ImplicitSegment : IteratedSegment<Real> {
 
 /** What a step keeps of the twist of a joint, and of the segment behind it: see ImplicitTwist-inl.h. */
 template <class Real> struct TwistedJoint {
-    // The torque is implicit times the change of the twist, and constant; what of that change an end frame makes.
-    Real implicit, constant, turnedByEnd;
+    // The torque is implicit times the change of the twist, and constant; what of that change an end frame makes, and
+    // by how much less for each torque of the joint.
+    Real implicit, constant, turnedByEnd, givesWay;
     // What joins the turns of both segments: implicit, less the friction of hands against both.
     Real coupling;
     // Of the segment: its friction over the step, the random torque, and what the elimination leaves.

@@ -11,7 +11,8 @@
  * with the twist q_s of a joint at the start, and the area swept_s that the great circle between its tangents sweeps on
  * the unit sphere, by which the angle between frames that are carried along changes. That is done in each iteration,
  * and the torques T_s that come out are forces -T_s J_s(m) on nodes. What a change of the nodes does to T is in the
- * equations as far as all torques of a chain change together. Hands that follow the helix add to Z and to random.
+ * equations as far as all torques of a chain change together. Hands that follow the helix add to Z and to random. An
+ * end frame that turns against a friction Z does so by h/Z (torque + random - T), which makes its joint softer.
  */
 
 /** Whether there are packs with twist: in double precision alone. */
@@ -84,14 +85,18 @@ public:
             const Real stiffness = loaded<Real>(twist.stiffness, s);
             Real friction = loaded<Real>(twist.friction, std::min(s, segments-1));
             joint.friction = friction*(1/step.h);
-            friction = lesser<Real>(friction, loaded<Real>(twist.friction, before(s)));
+            const Real ofFrame = loaded<Real>(twist.frameFriction, s);
+            friction = lesser<Real>(friction, lesser<Real>(ofFrame, loaded<Real>(twist.friction, before(s))));
             const Real theta = larger<Real>(splat<Real>(0.5), 1-friction/(4*step.h*stiffness+TINY));
-            joint.implicit = joint.coupling = stiffness*theta;
-            joint.constant = stiffness*step.start.twists[s]+loaded<Real>(twist.torque, s);
+            // A frame that turns against a friction has turned where the torque is known: it is eliminated here.
+            joint.givesWay = step.h/ofFrame;
+            const Real softer = 1/(1+stiffness*theta*joint.givesWay);
+            joint.implicit = joint.coupling = stiffness*theta*softer;
+            joint.constant = (stiffness*step.start.twists[s]+loaded<Real>(twist.torque, s))*softer;
             joint.turnedByEnd = loaded<Real>(twist.angularVelocity, s)*step.h;
             joint.random = Real{};
             // The noise of equilibrium, for now.
-            joint.torque = root(stiffness*(2*theta-1)*step.kT);
+            joint.torque = root(stiffness*(2*theta-1)*step.kT)*softer;
         }
         if (step.settings.kT > 0)
             draw();
@@ -193,7 +198,7 @@ public:
         solve<Moment::End>(y);
         for (int s = 0; s <= segments; s++) {
             const TwistedJoint<Real>& joint = joints[s];
-            changes[s] = joint.swept+joint.turnedByEnd;
+            changes[s] = joint.swept+joint.turnedByEnd-joint.givesWay*joint.torque;
             if (s < segments || CLOSED)
                 changes[s] = changes[s]+joints[s < segments ? s : 0].turn;
             if (s > 0)
@@ -247,6 +252,17 @@ private:
             TwistedJoint<Real>& joint = joints[s];
             joint.constant = joint.constant-normals[0]*joint.torque;
             joint.random = normals[1]*root(2*step.kT*joint.friction);
+        }
+        for (int i = 0; i < W && twist.hasTurningFrames; i++) {
+            if (pack.chain[i] < 0)
+                continue;
+            // Behind the numbers of tethers.
+            Scalar ofEnds[4];
+            drawNormals<1, 2>(key, NoiseKind::Tether, {(Word) pack.chain[i], (Word) UINT32_MAX}, ofEnds);
+            for (int end = 0; end < 2; end++) {
+                TwistedJoint<Real>& joint = joints[end == 0 ? 0 : pack.segmentsOfLane[i]];
+                lane(joint.turnedByEnd, i) += ofEnds[end]*std::sqrt(2*step.kT*lane(joint.givesWay, i));
+            }
         }
     }
     void addTurnedPairs() {

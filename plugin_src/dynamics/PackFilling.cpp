@@ -68,6 +68,7 @@ void fillTwist(PackTwist<double>& twist, int lanes, int lane, const Chain& chain
             values->assign((segments+1)*lanes, 0.0);
         // What fills up does not turn.
         twist.friction.assign(segments*lanes, 1e100);
+        twist.frameFriction.assign((segments+1)*lanes, 1e100);
         twist.directions.assign(6*lanes, 0.0);
     }
     for (size_t s = 0; s < segments; s++)
@@ -83,8 +84,15 @@ void fillTwist(PackTwist<double>& twist, int lanes, int lane, const Chain& chain
         const size_t place = (end == 0 ? 0 : segments)*lanes+lane;
         const double sign = end == 0 ? -1 : 1;
         twist.stiffness[place] = frame.stiffness;
-        twist.angularVelocity[place] = sign*frame.angularVelocity;
-        twist.torque[place] = sign*frame.torque;
+        if (frame.friction > 0) {
+            twist.frameFriction[place] = frame.friction;
+            twist.angularVelocity[place] = sign*frame.torque/frame.friction;
+            twist.hasTurningFrames = true;
+        }
+        else {
+            twist.angularVelocity[place] = sign*frame.angularVelocity;
+            twist.torque[place] = sign*frame.torque;
+        }
         for (int k = 0; k < 3; k++)
             twist.directions[(3*end+k)*lanes+lane] = frame.direction[k];
     }

@@ -16,7 +16,7 @@ enum class NoiseKind : std::uint32_t {
     Length = 1,
     /** Of the joint at the start of a segment: candidates for its bend, and whether they are accepted. */
     Bend = 2,
-    /** Of a tether, by its number among those of its chain. */
+    /** Of a tether, by its number among those of its chain; behind these, two of the frames at the chain's ends. */
     Tether = 3,
     /** Of a particle outside chains, by its index, with zero for the chain. */
     Particle = 4,

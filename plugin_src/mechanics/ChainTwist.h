@@ -9,10 +9,12 @@ namespace cylchain {
 struct EndFrame {
     /** Where the filament goes on, from its first to its last node: a unit vector; zero at an end that is free. */
     double direction[3] = {};
-    /** The stiffness of the joint against twist; zero if the frame turns freely about its direction. */
+    /** The stiffness of the joint against twist; zero if the frame turns with the last segment. */
     double stiffness = 0;
-    /** A torque on a frame that turns freely, and how fast one that is held is turned, both about the direction. */
+    /** A torque on a frame that turns, and how fast one that is held is turned, both about the direction. */
     double torque = 0, angularVelocity = 0;
+    /** Of a frame with a stiffness that turns against the solvent, as a bead does; zero for any other. */
+    double friction = 0;
 };
 
 /**

@@ -172,7 +172,7 @@ def test_bad_frames_are_refused():
         ({"torque": np.nan}, "torque"),
         ({"torque": 1.0 * unit.nanometer}, "torque"),
         ({"angular_velocity": np.inf}, "angular_velocity"),
-        ({"torque": 1.0, "angular_velocity": 1.0}, "not both"),
+        ({"torque": 1.0, "angular_velocity": 1.0}, "that is held"),
     ):
         with pytest.raises(InputError, match=message):
             filaments.add_end_frame(0, "plus", [0, 0, 1], **options)

@@ -163,6 +163,20 @@ def test_a_torsional_rigidity_in_place_of_a_length():
     assert (beside.temperature, beside.torsional_rigidity) == (None, pytest.approx(rigidity))
 
 
+def test_bead_turns_against_its_friction(tmp_path):
+    """By a torque, as far as its chain lets it, whose twist is even."""
+    text = WOUND[: WOUND.index("[[stage]]")].replace(
+        'angular_velocity = "3.141592653589793 1/us"', 'torque = "60 pN nm"\nrotational_friction = "13 pN nm us"'
+    )
+    text = text.replace("[simulation]", '[simulation]\nduration = "4 us"')
+    assert main(_run(text, tmp_path)) == 0
+    turns = analysis.load(tmp_path / "out").twist["twist (turns)"].mean(axis=1)
+    rigidity = 100.0 * thermal_energy(298) / 0.602214
+    end, relaxation = 60.0 * 100.0 / rigidity / (2 * np.pi), 13.0 * 100.0 / rigidity
+    time = 0.05 * np.arange(len(turns))
+    np.testing.assert_allclose(turns, end * (1.0 - np.exp(-time / relaxation)), atol=0.2 * end)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -174,7 +188,9 @@ def test_a_torsional_rigidity_in_place_of_a_length():
         ('"100 nm"', '"100 nm"\nelement = "beam"', "twist"),
         ('end = "plus"', 'end = "right"', "end"),
         ('end = "plus"', 'end = "minus"', "has a frame already"),
-        ('"3.141592653589793 1/us"', '"1 1/us"\ntorque = "8 pN nm"', "not both"),
+        ('"3.141592653589793 1/us"', '"1 1/us"\ntorque = "8 pN nm"', "that is held"),
+        ('"3.141592653589793 1/us"', '"1 1/us"\nrotational_friction = "3 pN nm us"', "that is held"),
+        ('angular_velocity = "3.141592653589793 1/us"', 'rotational_friction = "0 pN nm us"', "rotational_friction"),
         ("direction = [0, 0, 1]\nangular", "direction = [0, 0, 0]\nangular", "direction"),
         ("seed = 3", 'seed = 3\nengine = "portable"', r"no \[\[end_frame\]\]|has no"),
         ('angular_velocity = "0 1/us"', "active = false", "active"),

@@ -115,7 +115,18 @@ END_FRAME = TableKind(
             (1.0, 0.0, 0.0),
             "From minus to plus: where the filament would go on, or has come from.",
         ),
-        Key("torque", Quantity(units.ENERGY, "any"), None, "Torque on a frame that turns freely; it is held if none."),
+        Key(
+            "torque",
+            Quantity(units.ENERGY, "any"),
+            None,
+            "Torque on a frame that turns; without it and without a friction, the frame is held.",
+        ),
+        Key(
+            "rotational_friction",
+            Quantity(units.ROTATIONAL_FRICTION),
+            None,
+            "Of a frame that turns against it, as a bead does: pi eta d^3 of a sphere.",
+        ),
         Key(
             "angular_velocity",
             Quantity(units.RATE, "any"),
@@ -212,13 +223,14 @@ class Pull:
 
 @dataclass(frozen=True)
 class EndFrameGroup:
-    """An [[end_frame]] table: a frame beyond the same end of some filaments; torque and velocity in OpenMM's units."""
+    """An [[end_frame]] table: a frame beyond the same end of some filaments; numbers in OpenMM's units."""
 
     filaments: tuple
     end: str
     direction: tuple
     torque: float | None
     angular_velocity: float
+    rotational_friction: float | None
 
 
 @dataclass(frozen=True)
@@ -270,7 +282,7 @@ def read_pull(entries, groups):
 
 def read_end_frame(entries, groups):
     """The EndFrameGroup of an [[end_frame]] table."""
-    names = ("end", "direction", "torque", "angular_velocity")
+    names = ("end", "direction", "torque", "angular_velocity", "rotational_friction")
     return EndFrameGroup(_filaments(entries, groups), *(entries[name] for name in names))
 
 

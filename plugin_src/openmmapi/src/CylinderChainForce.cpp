@@ -328,35 +328,40 @@ static void checkEnd(const cylchain::Chain& chain, int end) {
 }
 
 void CylinderChainForce::setEndFrame(int chain, int end, const Vec3& direction, double stiffness, double torque,
-        double angularVelocity) {
+        double angularVelocity, double friction) {
     cylchain::Chain& own = getChain(chain);
     checkEnd(own, end);
     const double length = sqrt(direction.dot(direction));
     if (!isfinite(length) || !(stiffness >= 0 && isfinite(stiffness)) || !isfinite(torque) ||
-            !isfinite(angularVelocity))
+            !isfinite(angularVelocity) || !(friction >= 0 && isfinite(friction)))
         throw OpenMMException("CylinderChainForce: The direction, torque and angular velocity of an end frame must be "
-                "finite, and its stiffness not negative");
+                "finite, and its stiffness and friction not negative");
     if (length == 0 && (stiffness > 0 || torque != 0))
         throw OpenMMException("CylinderChainForce: An end frame that is held, or has a torque, needs a direction");
-    if (stiffness > 0 ? torque != 0 : angularVelocity != 0)
-        throw OpenMMException("CylinderChainForce: An end frame has a torque if it turns freely, and an angular "
-                "velocity if it is held");
+    const bool isHeld = stiffness > 0 && friction == 0;
+    if (isHeld ? torque != 0 : angularVelocity != 0)
+        throw OpenMMException("CylinderChainForce: An end frame has an angular velocity if it is held, and a torque if "
+                "it is not");
+    if (friction > 0 && stiffness == 0)
+        throw OpenMMException("CylinderChainForce: An end frame that turns against a friction needs a stiffness");
     cylchain::EndFrame& frame = own.twist.ends[end];
     for (int k = 0; k < 3; k++)
         frame.direction[k] = length > 0 ? direction[k]/length : 0.0;
     frame.stiffness = stiffness;
     frame.torque = torque;
     frame.angularVelocity = angularVelocity;
+    frame.friction = friction;
 }
 
 void CylinderChainForce::getEndFrame(int chain, int end, Vec3& direction, double& stiffness, double& torque,
-        double& angularVelocity) const {
+        double& angularVelocity, double& friction) const {
     checkEnd(getChain(chain), end);
     const cylchain::EndFrame& frame = getChain(chain).twist.ends[end];
     direction = Vec3(frame.direction[0], frame.direction[1], frame.direction[2]);
     stiffness = frame.stiffness;
     torque = frame.torque;
     angularVelocity = frame.angularVelocity;
+    friction = frame.friction;
 }
 
 void CylinderChainForce::getTwists(Context& context, int chain, vector<double>& twists) const {

@@ -33,7 +33,8 @@ static void writeTwist(SerializationNode& node, const ChainTwist& twist) {
         ends.createChildNode("End").setDoubleProperty("x", frame.direction[0])
                 .setDoubleProperty("y", frame.direction[1]).setDoubleProperty("z", frame.direction[2])
                 .setDoubleProperty("stiffness", frame.stiffness).setDoubleProperty("torque", frame.torque)
-                .setDoubleProperty("angularVelocity", frame.angularVelocity);
+                .setDoubleProperty("angularVelocity", frame.angularVelocity)
+                .setDoubleProperty("friction", frame.friction);
 }
 
 static void readTwist(const SerializationNode& node, CylinderChainForce& force, int chain) {
@@ -50,7 +51,8 @@ static void readTwist(const SerializationNode& node, CylinderChainForce& force, 
         if (!force.isChainClosed(chain))
             force.setEndFrame(chain, end, Vec3(frame.getDoubleProperty("x"), frame.getDoubleProperty("y"),
                     frame.getDoubleProperty("z")), frame.getDoubleProperty("stiffness"),
-                    frame.getDoubleProperty("torque"), frame.getDoubleProperty("angularVelocity"));
+                    frame.getDoubleProperty("torque"), frame.getDoubleProperty("angularVelocity"),
+                    frame.getDoubleProperty("friction", 0));
         end++;
     }
 }

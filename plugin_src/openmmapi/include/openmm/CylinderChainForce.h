@@ -265,25 +265,28 @@ public:
     void getChainTwist(int chain, std::vector<double>& stiffness, std::vector<double>& rest,
             std::vector<double>& friction) const;
     /**
-     * Set the frame beyond an end of an open chain with twist.  A frame is held if its joint has a stiffness, and turns
-     * freely if it has none.  An end is free unless this is called.
+     * Set the frame beyond an end of an open chain with twist.  A frame whose joint has a stiffness is held, or turns
+     * against a friction of its own, as a bead does; one without turns with the last segment.  An end is free unless
+     * this is called.
      *
      * @param chain            the index of the chain
      * @param end              0 for that of the first node, and 1 for that of the last
      * @param direction        where the chain goes on there, from its first to its last node, in any length; zero if
      *                         the end is free
      * @param stiffness        the stiffness of the joint to the frame against twist, measured in kJ/mol; zero if the
-     *                         frame turns freely
-     * @param torque           the torque on a frame that turns freely, about the direction, measured in kJ/mol
+     *                         frame turns with the last segment
+     * @param torque           the torque on a frame that is not held, about the direction, measured in kJ/mol
      * @param angularVelocity  how fast a frame that is held turns about the direction, measured in radians/ps
+     * @param friction         the friction against which a frame with a stiffness turns, measured in kJ ps/mol; zero if
+     *                         it is held
      */
     void setEndFrame(int chain, int end, const Vec3& direction, double stiffness, double torque,
-            double angularVelocity);
+            double angularVelocity, double friction = 0);
     /**
      * Get the frame beyond an end of a chain.  See setEndFrame() for details.
      */
     void getEndFrame(int chain, int end, Vec3& direction, double& stiffness, double& torque,
-            double& angularVelocity) const;
+            double& angularVelocity, double& friction) const;
     /**
      * Get the twists of a chain in a Context: the angle at each of its joints, from the frame before it to the one
      * behind it.  That of an open chain with N segments has N+1, the first and the last of which are those to the
