@@ -6,7 +6,7 @@ import pytest
 from openmm import unit
 from scipy.linalg import expm
 
-from openmm_cylchain import Filaments, FilamentType, InputError
+from openmm_cylchain import Filaments, FilamentType, InputError, capsule_contact_force
 from openmm_cylchain.engines.compiled import CylinderChainForce
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
@@ -40,9 +40,11 @@ def chains_with_beads(count, temperature, minus="held", segments=(SEGMENTS,), to
     return filaments
 
 
-def in_context(filaments, step, pull=0.0, platform="CPU"):
+def in_context(filaments, step, pull=0.0, platform="CPU", contacts=False):
     """A Context of filaments that are pulled, and held along z at their plus ends, and a FilamentsInContext."""
     _, system, positions = filaments.build()
+    if contacts:
+        system.addForce(capsule_contact_force(filaments, system, 2.0))
     force = openmm.CustomExternalForce("-pull*z")
     force.addPerParticleParameter("pull")
     for nodes in filaments.node_indices:
@@ -154,6 +156,18 @@ def test_beads_of_chains_of_other_lengths_share_lanes():
     for number, twists in enumerate(together):
         alone = after_steps(np.where(np.arange(3) == number, lengths, 4))[number]
         assert twists == pytest.approx(alone, abs=1e-9)
+
+
+@pytest.mark.parametrize("platform", ["Reference", "CPU"])
+def test_bead_turns_alike_where_filaments_may_touch(platform):
+    """Their steps are solved together then, and divided together: here, none touches another."""
+    ends = []
+    for contacts in (False, True):
+        filaments = chains_with_beads(3, TEMPERATURE, "bead", torque=TORQUE)
+        context, own = in_context(filaments, RELAXATION, 2.0 * KT, platform, contacts)
+        context.getIntegrator().step(6)
+        ends.append([own.twists(number)._value for number in range(3)])
+    assert np.array(ends[0]) == pytest.approx(np.array(ends[1]), abs=1e-3)
 
 
 def test_beads_are_given_with_units_and_survive_xml():
