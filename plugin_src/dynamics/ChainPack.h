@@ -3,6 +3,7 @@
 
 #include "dynamics/ChainEngine.h"
 #include "lanes/Noise.h"
+#include <cstddef>
 #include <memory>
 #include <vector>
 
@@ -15,17 +16,30 @@ struct LaneTether : Tether {
 
 /** Twist of the chains of a pack: see ChainTwist. What fills up has no stiffness. */
 template <class Scalar> struct PackTwist {
-    /**
-     * Of the joint at each node, [node][lane]: the stiffness, the angle at rest, how fast it is turned, and a torque
-     * that is there in any case. The last two are those of end frames.
-     */
-    std::vector<Scalar> stiffness, rest, angularVelocity, torque;
+    /** Of the joint at each node, [node][lane]: the stiffness, and the torque on an end frame. */
+    std::vector<Scalar> stiffness, torque;
+    /** The angle at rest, and how fast an end frame is turned. In double precision, as twists are, like what follows. */
+    std::vector<double> rest, angularVelocity;
+    /** The directions of end frames, [end][axis][lane]. */
+    std::vector<double> directions;
     /** Of each segment, [segment][lane]; nothing if chains have no twist. */
     std::vector<Scalar> friction;
-    /** The directions of end frames, [end][axis][lane]. */
-    std::vector<Scalar> directions;
-    /** Whether any chain is held at both ends, or is closed, so that all of it shares a torque. */
+    /** One for each lane whose chain is held at both ends, or is closed, so that all of it shares a torque. */
+    std::vector<Scalar> held;
+    /** Whether there is one. */
     bool isHeld = false;
+    PackTwist() = default;
+    PackTwist(int segments, int lanes) {
+        const std::size_t numbers = (std::size_t) (segments+1)*lanes;
+        stiffness.resize(numbers);
+        torque.resize(numbers);
+        rest.resize(numbers);
+        angularVelocity.resize(numbers);
+        // Far from zero, so that joints have that of the segment which is there, and from where floats end.
+        friction.resize(numbers-lanes, 1e30);
+        directions.resize(6*lanes);
+        held.resize(lanes);
+    }
     bool isPresent() const {
         return !friction.empty();
     }

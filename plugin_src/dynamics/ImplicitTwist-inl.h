@@ -14,63 +14,18 @@
  * equations as far as all torques of a chain change together. Hands that follow the helix add to Z and to random.
  */
 
-/** Whether there are packs with twist: in double precision alone. */
-constexpr bool HAS_TWIST = sizeof(Scalar) == sizeof(double);
-
 /** By this much, nodes may give way to the torque that all of a chain shares without its being in their equations. */
 const Scalar NEARLY_RIGID = 0.1;
-
-/** tan(pi/8). */
-const Scalar TANGENT_OF_EIGHTH = M_SQRT2-1;
-
-/** The angle whose tangent is within 0.2, to 10^-17 there. */
-template <class Real> CYLCHAIN_INLINE Real arctangent(Real tangent) {
-    const Real square = tangent*tangent;
-    Real result = splat<Real>(1.0/21);
-#pragma GCC unroll 10
-    for (int k = 19; k > 0; k -= 2)
-        result = splat<Real>(1.0/k)-square*result;
-    return result*tangent;
-}
-
-/** The angle of a complex number x+iy, in (-pi, pi). */
-template <class Real> CYLCHAIN_INLINE Real argument(Real x, Real y) {
-    const Real zero = Real{}, tangent = y/x;
-    Real square = x > zero ? tangent*tangent : splat<Real>(1);
-    bool isSmall = true;
-    for (int i = 0; i < LANE_COUNT<Real>; i++)
-        isSmall &= lane(square, i) < 0.04;
-    if (isSmall)
-        return arctangent<Real>(tangent);
-    // Of an angle within pi/4, half of what it is beyond pi/8.
-    const Real across = y < zero ? -y : y, along = x < zero ? -x : x;
-    const Real least = lesser<Real>(across, along), most = larger<Real>(across, along)+TINY;
-    const Real beyond = (least-TANGENT_OF_EIGHTH*most)/(most+TANGENT_OF_EIGHTH*least);
-    Real angle = M_PI/8+2*arctangent<Real>(beyond/(1+root(1+beyond*beyond)));
-    angle = across > along ? M_PI/2-angle : angle;
-    angle = x < zero ? M_PI-angle : angle;
-    return y < zero ? -angle : angle;
-}
-
-/**
- * The area on the unit sphere that the great circle from a to b sweeps as it moves to that from newA to newB: positive
- * if a, b, newB, newA go around it counterclockwise, as seen from outside.
- */
-template <class Real> CYLCHAIN_INLINE Real sweptArea(const Vector<Real>& a, const Vector<Real>& b,
-        const Vector<Real>& newA, const Vector<Real>& newB) {
-    // The sum of two triangles.
-    const Real across = 1+a.dot(newB);
-    const Real x1 = across+a.dot(b)+b.dot(newB), y1 = a.dot(crossProduct(b, newB));
-    const Real x2 = across+newA.dot(newB)+a.dot(newA), y2 = a.dot(crossProduct(newB, newA));
-    return 2*argument<Real>(x1*x2-y1*y2, x1*y2+x2*y1);
-}
 
 template <int W, bool CLOSED> class ImplicitTwist {
     typedef typename Lanes<W>::Type Real;
     typedef Vector<Real> Vec;
+    typedef typename DoubleLanes<W>::Type Double;
+    static constexpr int REGISTERS = DoubleLanes<W>::REGISTERS;
 public:
     explicit ImplicitTwist(ImplicitState<W>& step) : step(step), pack(step.pack), twist(pack.twist),
-            ofSegments(step), segments(pack.segments), first(CLOSED ? 1 : 0), joints(step.joints) {
+            ofSegments(step), segments(pack.segments), first(CLOSED ? 1 : 0), joints(step.joints),
+            newSegments(step.newSegments) {
         for (int end = 0; end < 2 && !CLOSED && twist.isPresent(); end++)
             directions[end] = {loaded<Real>(twist.directions, 3*end), loaded<Real>(twist.directions, 3*end+1),
                     loaded<Real>(twist.directions, 3*end+2)};
@@ -87,8 +42,8 @@ public:
             friction = lesser<Real>(friction, loaded<Real>(twist.friction, before(s)));
             const Real theta = larger<Real>(splat<Real>(0.5), 1-friction/(4*step.h*stiffness+TINY));
             joint.implicit = joint.coupling = stiffness*theta;
-            joint.constant = stiffness*step.start.twists[s]+loaded<Real>(twist.torque, s);
-            joint.turnedByEnd = loaded<Real>(twist.angularVelocity, s)*step.h;
+            joint.constant = stiffness*step.start.twists[s]+loaded<Real>(twist.torque, s)+
+                    joint.implicit*(loaded<Real>(twist.angularVelocity, s)*step.h);
             joint.random = Real{};
             // The noise of equilibrium, for now.
             joint.torque = root(stiffness*(2*theta-1)*step.kT);
@@ -137,7 +92,7 @@ public:
     /** A segment as addForces() has found it. */
     CYLCHAIN_INLINE NewSegmentGeometry<Real> getSegment(int s) const {
         if (haveMoved)
-            return joints[s].segment;
+            return newSegments[s];
         const IteratedSegment<Real>& start = step.segments[s];
         return {{start.difference, start.tangent, start.length, start.inverse}, start.tangent, start.inverse};
     }
@@ -189,15 +144,16 @@ public:
         here.upper = here.upper+mixed;
     }
     /** Find how the twists have changed when the nodes have moved by y. */
-    __attribute__((noinline)) void findChanges(const Vec* y, Real* changes) {
-        solve<Moment::End>(y);
-        for (int s = 0; s <= segments; s++) {
-            const TwistedJoint<Real>& joint = joints[s];
-            changes[s] = joint.swept+joint.turnedByEnd;
+    __attribute__((noinline)) void findChanges(const Vec* y, Double* changes) {
+        findSweptAreas<W, CLOSED>(pack, step.start, y, changes);
+        solve<Moment::End>(y, changes);
+        for (int place = 0; place < (segments+1)*REGISTERS; place++) {
+            const int s = place/REGISTERS, part = place%REGISTERS;
+            changes[place] = changes[place]+loaded<Double>(twist.angularVelocity, place)*step.settings.stepSize;
             if (s < segments || CLOSED)
-                changes[s] = changes[s]+joints[s < segments ? s : 0].turn;
+                changes[place] = changes[place]+inDouble<W>(joints[s < segments ? s : 0].turn, part);
             if (s > 0)
-                changes[s] = changes[s]-joints[s-1].turn;
+                changes[place] = changes[place]-inDouble<W>(joints[s-1].turn, part);
         }
     }
 private:
@@ -207,6 +163,7 @@ private:
     const SegmentEquations<W> ofSegments;
     const int segments, first;
     TwistedJoint<Real>* const joints;
+    NewSegmentGeometry<Real>* const newSegments;
     Vec directions[2];
     /** Whether torques have been found for nodes that have moved, whose segments joints know. */
     bool haveMoved = false;
@@ -241,9 +198,9 @@ private:
         const NoiseKey key = noiseKey(step.settings);
         NoisePlaces<W> places = noisePlaces<W>(pack);
         // Chains with twist have no friction of nodes, whose numbers these would be.
-        Real normals[4];
+        Real normals[2];
         for (int s = 0; s <= segments; s++, places.part += 1) {
-            drawNormals<W, 2>(key, NoiseKind::Node, places, normals);
+            drawNormals<W, 1>(key, NoiseKind::Node, places, normals);
             TwistedJoint<Real>& joint = joints[s];
             joint.constant = joint.constant-normals[0]*joint.torque;
             joint.random = normals[1]*root(2*step.kT*joint.friction);
@@ -277,40 +234,44 @@ private:
     }
     /** Eliminate the turns of segments, and find how torques respond to a change of all twists. */
     void factorise() {
+        // What a segment has beyond the joint behind it. A difference of pivots would lose the friction in rounding.
+        Real own = joints[jointBefore(0)].implicit;
         for (int s = 0; s < segments; s++) {
-            Real pivot = joints[s].friction+joints[jointBefore(s)].implicit+joints[s+1].implicit;
-            if (CLOSED && s == 0)
+            if (s > 0) {
+                const Real stiffness = joints[s].implicit, coupling = joints[s].coupling;
+                own = (stiffness*own+(stiffness-coupling)*(stiffness+coupling))*joints[s-1].inversePivot;
+            }
+            own = own+joints[s].friction;
+            Real pivot = own+joints[s+1].implicit;
+            if (CLOSED && s == 0) {
+                own = own+pivot;
                 pivot = pivot+pivot;
+            }
             if (CLOSED && s == segments-1) {
                 const Real last = joints[segments].coupling;
                 pivot = pivot+last*last*(2*joints[0].inversePivot);
             }
-            if (s > 0)
-                pivot = pivot-joints[s].coupling*joints[s].coupling*joints[s-1].inversePivot;
-            joints[s].inversePivot = 1/pivot;
+            // What fills up does not turn.
+            joints[s].inversePivot = ofOwn(s, 1/pivot, Real{});
         }
         if (CLOSED) {
             // By Sherman and Morrison, for the coupling of the last segment and the first.
             const Real last = joints[segments].coupling, diagonal = 0.5/joints[0].inversePivot;
             corner = last/diagonal;
-            for (int s = 0; s < segments; s++)
-                joints[s].turn = s == 0 ? -diagonal : Real{};
-            joints[segments-1].turn = joints[segments-1].turn-last;
-            substitute();
+            substitute([&] (int s) {return s == 0 ? -diagonal : s == segments-1 ? -last : Real{};});
             for (int s = 0; s < segments; s++)
                 joints[s].border = joints[s].turn;
             perCorner = 1/(1+joints[0].border+corner*joints[segments-1].border);
         }
         if (!twist.isHeld)
             return;
-        for (int s = 0; s < segments; s++)
-            joints[s].turn = joints[s+1].implicit-joints[jointBefore(s)].implicit;
-        substitute();
+        substitute([&] (int s) {return joints[s+1].implicit-joints[jointBefore(s)].implicit;});
         if (CLOSED)
             closeRing();
         shared = Real{};
+        const Real held = loaded<Real>(twist.held, 0);
         for (int s = first; s <= segments; s++) {
-            joints[s].share = joints[s].implicit*(1+twistOfTurns(s));
+            joints[s].share = held*joints[s].implicit*(1+twistOfTurns(s));
             shared = shared+joints[s].share;
         }
         for (int s = first; s <= segments; s++)
@@ -325,15 +286,19 @@ private:
             result = result-joints[s-1].turn;
         return result;
     }
-    /** Solve the equations of open chains for turns, in which the right sides are. */
-    void substitute() {
-        for (int s = 1; s < segments; s++)
-            joints[s].turn = joints[s].turn+joints[s].coupling*joints[s-1].inversePivot*joints[s-1].turn;
+    /** Solve the equations of open chains for turns, with a function of their right sides. */
+    template <class Function> CYLCHAIN_INLINE void substitute(Function right) {
+        Real part = Real{};
+        for (int s = 0; s < segments; s++) {
+            part = right(s)+joints[s].coupling*part;
+            joints[s].turn = part;
+            part = part*joints[s].inversePivot;
+        }
+        part = Real{};
         for (int s = segments-1; s >= 0; s--) {
-            Real right = joints[s].turn;
-            if (s < segments-1)
-                right = right+joints[s+1].coupling*joints[s+1].turn;
-            joints[s].turn = right*joints[s].inversePivot;
+            part = (joints[s].turn+part)*joints[s].inversePivot;
+            joints[s].turn = part;
+            part = part*joints[s].coupling;
         }
     }
     void closeRing() {
@@ -344,7 +309,7 @@ private:
     /** What torques are found for: the start of a step, or nodes in an iteration or after the last one. */
     enum class Moment {Start, Iteration, End};
     /** Find the turns and torques for new nodes. */
-    template <Moment MOMENT> void solve(const Vec* y) {
+    template <Moment MOMENT> void solve(const Vec* y, const Double* areas = NULL) {
         Vec tangent = directions[0], newTangent = directions[0], middle = directions[0];
         for (int s = 0; s <= segments; s++) {
             TwistedJoint<Real>& joint = joints[s];
@@ -355,34 +320,27 @@ private:
                 if constexpr (MOMENT == Moment::Start)
                     middle = tangent;
                 else if constexpr (MOMENT == Moment::Iteration) {
-                    ofSegments.describeNew(y, s, joint.segment);
-                    newTangent = directionAt(s, joint.segment.tangent);
-                    middle = directionAt(s, joint.segment.middleTangent);
-                }
-                else {
-                    const Vec difference = start.difference+(y[s+1]-y[s]);
-                    newTangent = directionAt(s, difference*(1/root(difference.dot(difference))));
+                    ofSegments.describeNew(y, s, newSegments[s]);
+                    newTangent = directionAt(s, newSegments[s].tangent);
+                    middle = directionAt(s, newSegments[s].middleTangent);
                 }
             }
             else
                 tangent = newTangent = middle = directions[1];
             if (s < first)
                 continue;
-            Real change = joint.turnedByEnd;
-            if constexpr (MOMENT != Moment::Start) {
-                joint.swept = sweptArea<Real>(before, tangent, newBefore, newTangent);
-                change = change+joint.swept;
-            }
+            joint.torque = joint.constant;
+            if constexpr (MOMENT == Moment::Iteration)
+                joint.torque = joint.torque+joint.implicit*sweptArea<Real>(before, tangent, newBefore, newTangent);
+            if constexpr (MOMENT == Moment::End)
+                joint.torque = joint.torque+joint.implicit*fromDouble<W>(areas+s*REGISTERS);
             if constexpr (MOMENT != Moment::End) {
                 joint.perCosine = 1/(1+middleBefore.dot(middle)+TINY);
                 joint.curvature = crossProduct(middleBefore, middle)*joint.perCosine;
                 joint.perCosine = ofOwn(s, joint.perCosine, Real{});
             }
-            joint.torque = joint.implicit*change+joint.constant;
         }
-        for (int s = 0; s < segments; s++)
-            joints[s].turn = joints[s].random+joints[s+1].torque-joints[jointBefore(s)].torque;
-        substitute();
+        substitute([&] (int s) {return joints[s].random+joints[s+1].torque-joints[jointBefore(s)].torque;});
         if (CLOSED)
             closeRing();
         for (int s = first; s <= segments; s++)

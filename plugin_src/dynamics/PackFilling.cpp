@@ -63,13 +63,8 @@ void fillTwist(PackTwist<double>& twist, int lanes, int lane, const Chain& chain
         return;
     const ChainTwist& own = chain.twist;
     const size_t segments = chain.segments.size();
-    if (!twist.isPresent()) {
-        for (auto* values : {&twist.stiffness, &twist.rest, &twist.angularVelocity, &twist.torque})
-            values->assign((segments+1)*lanes, 0.0);
-        // What fills up does not turn.
-        twist.friction.assign(segments*lanes, 1e100);
-        twist.directions.assign(6*lanes, 0.0);
-    }
+    if (!twist.isPresent())
+        twist = PackTwist<double>(segments, lanes);
     for (size_t s = 0; s < segments; s++)
         twist.friction[s*lanes+lane] = own.friction[s];
     for (size_t joint = 0; joint < own.stiffness.size(); joint++) {
@@ -77,7 +72,9 @@ void fillTwist(PackTwist<double>& twist, int lanes, int lane, const Chain& chain
         twist.stiffness[node*lanes+lane] = own.stiffness[joint];
         twist.rest[node*lanes+lane] = own.rest[joint];
     }
-    twist.isHeld |= chain.closed || (own.ends[0].stiffness > 0 && own.ends[1].stiffness > 0);
+    const bool isHeld = chain.closed || (own.ends[0].stiffness > 0 && own.ends[1].stiffness > 0);
+    twist.held[lane] = isHeld;
+    twist.isHeld |= isHeld;
     for (int end = 0; end < 2 && !chain.closed; end++) {
         const EndFrame& frame = own.ends[end];
         const size_t place = (end == 0 ? 0 : segments)*lanes+lane;

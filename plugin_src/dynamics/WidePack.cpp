@@ -14,6 +14,8 @@ namespace {
  * lengths, k l0^2/k_B T.
  */
 const double LARGEST_STRETCHING = 1e9;
+/** The same for the stiffness of twist, k/k_B T. */
+const double LARGEST_TWISTING = 1e6;
 /** The same for the step over the relaxation time of the sharpest bends, 4 h kappa/gamma_rot or 16 h kappa/xi. */
 double largestBendingRate(BendKind kind) {
     switch (kind) {
@@ -68,6 +70,18 @@ ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>
         copyTo(wide.turning, pack->turning);
         copyTo(wide.nodeFriction, pack->nodeFriction);
         copyTo(wide.rootNodeFriction, pack->rootNodeFriction);
+        if (pack->twist.isPresent()) {
+            if (!wide.twist.isPresent())
+                wide.twist = PackTwist<float>(wide.segments, lanes);
+            copyTo(wide.twist.stiffness, pack->twist.stiffness);
+            copyTo(wide.twist.torque, pack->twist.torque);
+            copyTo(wide.twist.rest, pack->twist.rest);
+            copyTo(wide.twist.angularVelocity, pack->twist.angularVelocity);
+            copyTo(wide.twist.friction, pack->twist.friction);
+            copyTo(wide.twist.directions, pack->twist.directions);
+            copyTo(wide.twist.held, pack->twist.held);
+            wide.twist.isHeld |= pack->twist.isHeld;
+        }
         if (!pack->propulsions.empty())
             wide.propulsions.resize((size_t) (wide.nodes-1)*lanes);
         copyTo(wide.propulsions, pack->propulsions);
@@ -103,6 +117,7 @@ bool WidePack::isUsed(const StepSettings& settings) const {
     // A flow needs to know where chains are. Written so that NaN is not right.
     return settings.precision != Precision::Double && isImplicit(settings.scheme) && !settings.flow.present &&
             settings.kT > 0 && stretching <= LARGEST_STRETCHING*settings.kT &&
+            twisting <= LARGEST_TWISTING*settings.kT && !(twisting > 0 && settings.turnedPairs != NULL) &&
             h*bendingRate <= 1 && leastFriction >= LEAST_RESISTANCE*h &&
             largestFriction+h*bending <= LARGEST_RESISTANCE*h &&
             2*settings.kT*h >= LEAST_CHANGE*LEAST_CHANGE*lengthFriction;
@@ -129,6 +144,10 @@ void WidePack::include(const Chain& chain) {
         bendingRate = max(bendingRate, 4*stiffness/friction/largestBendingRate(kind));
         bending = max(bending, 4*stiffness/(length*length));
     }
+    for (double stiffness : chain.twist.stiffness)
+        twisting = max(twisting, stiffness);
+    for (const EndFrame& frame : chain.twist.ends)
+        twisting = max(twisting, frame.stiffness);
     for (const Tether& tether : chain.tethers)
         bending = max(bending, tether.stiffness);
 }
