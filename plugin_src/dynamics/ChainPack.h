@@ -16,11 +16,12 @@ struct LaneTether : Tether {
 
 /** Twist of the chains of a pack: see ChainTwist. What fills up has no stiffness. */
 template <class Scalar> struct PackTwist {
-    /** Of the joint at each node, [node][lane]: the stiffness, and the torque on an end frame. */
-    std::vector<Scalar> stiffness, torque;
-    /** The angle at rest, and how fast an end frame is turned. In double precision, as twists are, like what follows. */
-    std::vector<double> rest, angularVelocity;
-    /** The directions of end frames, [end][axis][lane]. */
+    /** Of the joint at each node, [node][lane]: the stiffness, and the angle at rest, in double precision as twists are. */
+    std::vector<Scalar> stiffness;
+    std::vector<double> rest;
+    /** Of end frames, [end][lane], with the sign that twist has there: the torque, and how fast they are turned. */
+    std::vector<double> torque, angularVelocity;
+    /** Their directions, [end][axis][lane]. */
     std::vector<double> directions;
     /** Of each segment, [segment][lane]; nothing if chains have no twist. */
     std::vector<Scalar> friction;
@@ -32,9 +33,9 @@ template <class Scalar> struct PackTwist {
     PackTwist(int segments, int lanes) {
         const std::size_t numbers = (std::size_t) (segments+1)*lanes;
         stiffness.resize(numbers);
-        torque.resize(numbers);
         rest.resize(numbers);
-        angularVelocity.resize(numbers);
+        torque.resize(2*lanes);
+        angularVelocity.resize(2*lanes);
         // Far from zero, so that joints have that of the segment which is there, and from where floats end.
         friction.resize(numbers-lanes, 1e30);
         directions.resize(6*lanes);

@@ -68,34 +68,33 @@ template <int W> void gatherExactSegments(const Pack& pack, const double* positi
     }
 }
 
+/** Call a function with each twist in lanes: its chain and its number there, its node and its lane. */
+template <int W, class Function> CYLCHAIN_INLINE void forTwists(const Pack& pack, Function function) {
+    forPlacesOfLanes<W>(numTwists(pack), [&] (int node, int i) {
+        if (pack.chain[i] >= 0 && node <= pack.segmentsOfLane[i] && !(pack.closed && node == 0))
+            function(pack.chain[i], pack.closed ? node%pack.segments : node, node, i);
+    });
+}
+
 /** Bring twists into lanes, less those at rest. */
 template <int W> void gatherTwists(const Pack& pack, const StepSettings& settings, TwistMemory& memory,
             StepStart<W>& start) {
     start.twists = memory.twists.reserve<typename Lanes<W>::Type>(numTwists(pack));
     for (int node = 0; node < numTwists(pack); node++)
         start.twists[node] = typename Lanes<W>::Type {};
-    for (int i = 0; i < W && pack.twist.isPresent(); i++) {
-        if (pack.chain[i] < 0)
-            continue;
-        const std::vector<double>& own = (*settings.twists)[pack.chain[i]];
-        for (std::size_t joint = 0; joint < own.size(); joint++) {
-            const int node = pack.closed && joint == 0 ? pack.segments : joint;
-            lane(start.twists[node], i) = own[joint]-pack.twist.rest[node*W+i];
-        }
-    }
+    forTwists<W>(pack, [&] (int chain, int joint, int node, int i) {
+        lane(start.twists[node], i) = (*settings.twists)[chain][joint]-pack.twist.rest[node*W+i];
+    });
 }
 
 /** Write how much the twists of some lanes change. */
 template <int W> void scatterTwists(const Pack& pack, const StepSettings& settings,
             const typename DoubleLanes<W>::Type* changes, const bool* taken) {
     const double* const all = reinterpret_cast<const double*>(changes);
-    for (int i = 0; i < W && pack.twist.isPresent(); i++) {
-        if (pack.chain[i] < 0 || (taken != NULL && !taken[i]))
-            continue;
-        std::vector<double>& own = (*settings.twistChanges)[pack.chain[i]];
-        for (std::size_t joint = 0; joint < own.size(); joint++)
-            own[joint] = all[(pack.closed && joint == 0 ? pack.segments : joint)*W+i];
-    }
+    forTwists<W>(pack, [&] (int chain, int joint, int node, int i) {
+        if (taken == NULL || taken[i])
+            (*settings.twistChanges)[chain][joint] = all[node*W+i];
+    });
 }
 
 /** Where a step would begin if its nodes had moved already, and its twists changed. */

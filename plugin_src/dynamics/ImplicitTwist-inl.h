@@ -34,20 +34,25 @@ public:
     }
     /** Describe the start of a step, draw the noise, and eliminate the turns of segments. */
     __attribute__((noinline)) void begin() {
+        Real frictionBefore = loaded<Real>(twist.friction, CLOSED ? segments-1 : 0);
         for (int s = 0; s <= segments; s++) {
             TwistedJoint<Real>& joint = joints[s];
             const Real stiffness = loaded<Real>(twist.stiffness, s);
-            Real friction = loaded<Real>(twist.friction, std::min(s, segments-1));
+            const Real friction = s < segments ? loaded<Real>(twist.friction, s) : frictionBefore;
             joint.friction = friction*(1/step.h);
-            friction = lesser<Real>(friction, loaded<Real>(twist.friction, before(s)));
-            const Real theta = larger<Real>(splat<Real>(0.5), 1-friction/(4*step.h*stiffness+TINY));
+            const Real least = lesser<Real>(friction, frictionBefore);
+            frictionBefore = friction;
+            const Real theta = larger<Real>(splat<Real>(0.5), 1-least/(4*step.h*stiffness+TINY));
             joint.implicit = joint.coupling = stiffness*theta;
-            joint.constant = stiffness*step.start.twists[s]+loaded<Real>(twist.torque, s)+
-                    joint.implicit*(loaded<Real>(twist.angularVelocity, s)*step.h);
+            joint.constant = stiffness*step.start.twists[s];
             joint.random = Real{};
             // The noise of equilibrium, for now.
             joint.torque = root(stiffness*(2*theta-1)*step.kT);
         }
+        forEnds([&] (int s, int i, int end) {
+            const double turn = twist.angularVelocity[end]*step.settings.stepSize;
+            lane(joints[s].constant, i) += twist.torque[end]+lane(joints[s].implicit, i)*turn;
+        });
         if (step.settings.kT > 0)
             draw();
         if (step.settings.turnedPairs != NULL)
@@ -149,12 +154,14 @@ public:
         solve<Moment::End>(y, changes);
         for (int place = 0; place < (segments+1)*REGISTERS; place++) {
             const int s = place/REGISTERS, part = place%REGISTERS;
-            changes[place] = changes[place]+loaded<Double>(twist.angularVelocity, place)*step.settings.stepSize;
             if (s < segments || CLOSED)
                 changes[place] = changes[place]+inDouble<W>(joints[s < segments ? s : 0].turn, part);
             if (s > 0)
                 changes[place] = changes[place]-inDouble<W>(joints[s-1].turn, part);
         }
+        forEnds([&] (int s, int i, int end) {
+            reinterpret_cast<double*>(changes+s*REGISTERS)[i] += twist.angularVelocity[end]*step.settings.stepSize;
+        });
     }
 private:
     ImplicitState<W>& step;
@@ -186,13 +193,16 @@ private:
         const Vec& frame = directions[1];
         return {ofOwn(s, tangent.x, frame.x), ofOwn(s, tangent.y, frame.y), ofOwn(s, tangent.z, frame.z)};
     }
-    /** The segment before a joint, or at the first end of an open chain, the one behind it. */
-    int before(int s) const {
-        return s > 0 ? s-1 : CLOSED ? segments-1 : 0;
-    }
     /** The joint before a segment. */
     int jointBefore(int s) const {
         return s == 0 && CLOSED ? segments : s;
+    }
+    /** Call a function with the joint and the lane of each end of open chains, and where its frame is in lists. */
+    template <class Function> CYLCHAIN_INLINE void forEnds(Function function) const {
+        for (int i = 0; i < W && !CLOSED; i++) {
+            function(0, i, i);
+            function(pack.segmentsOfLane[i], i, W+i);
+        }
     }
     void draw() {
         const NoiseKey key = noiseKey(step.settings);
@@ -308,7 +318,7 @@ private:
     }
     /** What torques are found for: the start of a step, or nodes in an iteration or after the last one. */
     enum class Moment {Start, Iteration, End};
-    /** Find the turns and torques for new nodes. */
+    /** Find the turns for new nodes, and the torques as if there were none. */
     template <Moment MOMENT> void solve(const Vec* y, const Double* areas = NULL) {
         Vec tangent = directions[0], newTangent = directions[0], middle = directions[0];
         for (int s = 0; s <= segments; s++) {
@@ -343,11 +353,10 @@ private:
         substitute([&] (int s) {return joints[s].random+joints[s+1].torque-joints[jointBefore(s)].torque;});
         if (CLOSED)
             closeRing();
-        for (int s = first; s <= segments; s++)
-            joints[s].torque = joints[s].torque+joints[s].implicit*twistOfTurns(s);
     }
-    /** Find the force and the gradient of a joint, on either of its segments, as if that had the length one. */
-    CYLCHAIN_INLINE void findForces(int s, Vec& force, Vec& gradient) const {
+    /** Find the torque of a joint, and its force and gradient on either of its segments, as if that had the length one. */
+    CYLCHAIN_INLINE void findForces(int s, Vec& force, Vec& gradient) {
+        joints[s].torque = joints[s].torque+joints[s].implicit*twistOfTurns(s);
         force = joints[s].curvature*joints[s].torque;
         if (twist.isHeld)
             gradient = joints[s].curvature*joints[s].share;

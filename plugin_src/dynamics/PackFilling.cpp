@@ -77,11 +77,10 @@ void fillTwist(PackTwist<double>& twist, int lanes, int lane, const Chain& chain
     twist.isHeld |= isHeld;
     for (int end = 0; end < 2 && !chain.closed; end++) {
         const EndFrame& frame = own.ends[end];
-        const size_t place = (end == 0 ? 0 : segments)*lanes+lane;
         const double sign = end == 0 ? -1 : 1;
-        twist.stiffness[place] = frame.stiffness;
-        twist.angularVelocity[place] = sign*frame.angularVelocity;
-        twist.torque[place] = sign*frame.torque;
+        twist.stiffness[(end == 0 ? 0 : segments)*lanes+lane] = frame.stiffness;
+        twist.angularVelocity[end*lanes+lane] = sign*frame.angularVelocity;
+        twist.torque[end*lanes+lane] = sign*frame.torque;
         for (int k = 0; k < 3; k++)
             twist.directions[(3*end+k)*lanes+lane] = frame.direction[k];
     }
