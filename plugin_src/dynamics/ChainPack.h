@@ -16,7 +16,7 @@ struct LaneTether : Tether {
 
 /** Twist of the chains of a pack: see ChainTwist. What fills up has no stiffness. */
 template <class Scalar> struct PackTwist {
-    /** Of the joint at each node, [node][lane]: the stiffness, and the angle at rest, in double precision as twists are. */
+    /** Of the joint at each node, [node][lane]: the stiffness, and the angle at rest, a double as twists are. */
     std::vector<Scalar> stiffness;
     std::vector<double> rest;
     /** Of end frames, [end][lane], with the sign that twist has there: the torque, and how fast they are turned. */

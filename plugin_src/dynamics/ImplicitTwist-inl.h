@@ -172,7 +172,7 @@ private:
     TwistedJoint<Real>* const joints;
     NewSegmentGeometry<Real>* const newSegments;
     Vec directions[2];
-    /** Whether torques have been found for nodes that have moved, whose segments joints know. */
+    /** Whether torques have been found for nodes that have moved, whose segments are known. */
     bool haveMoved = false;
     /** Whether a chain is shorter than others. */
     bool isFilledUp = false;
@@ -354,7 +354,7 @@ private:
         if (CLOSED)
             closeRing();
     }
-    /** Find the torque of a joint, and its force and gradient on either of its segments, as if that had the length one. */
+    /** Find the torque of a joint, its force and its gradient, on either segment as if that had the length one. */
     CYLCHAIN_INLINE void findForces(int s, Vec& force, Vec& gradient) {
         joints[s].torque = joints[s].torque+joints[s].implicit*twistOfTurns(s);
         force = joints[s].curvature*joints[s].torque;

@@ -86,7 +86,7 @@ template <int W> void gatherStart(const Pack& pack, const double* positions, con
             x[node].z = x[0].z;
 }
 
-/** Call a function with the vector of each segment in each lane: differences of doubles, however far from the origin. */
+/** Call a function with the vector of each segment and lane: differences of doubles, however far from the origin. */
 template <int W, class Function> CYLCHAIN_INLINE void forSegments(const Pack& pack, const double* positions,
             const double* box, Function function) {
     forPlacesOfLanes<W>(pack.nodes-1, [&] (int s, int i) {

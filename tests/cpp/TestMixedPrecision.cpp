@@ -193,7 +193,8 @@ static double sweptBy(const Chain& chain, const Array& x, const Array& y) {
     double area = 0;
     for (int s = 0; s <= segments; s++) {
         const Array a = s > 0 ? tangentOf(chain, x, s-1) : first, b = s < segments ? tangentOf(chain, x, s) : last;
-        const Array newA = s > 0 ? tangentOf(chain, y, s-1) : first, newB = s < segments ? tangentOf(chain, y, s) : last;
+        const Array newA = s > 0 ? tangentOf(chain, y, s-1) : first;
+        const Array newB = s < segments ? tangentOf(chain, y, s) : last;
         area += triangle(a, b, newB)+triangle(a, newB, newA);
     }
     return area;
@@ -595,7 +596,8 @@ static void testEnergiesOfTwist() {
         double* const sums = energies[precision == Precision::Mixed];
         for (int step = 0; step < steps; step++) {
             settings.step = step;
-            check(mixedChains(precision, engine, settings) == (precision == Precision::Mixed ? count : 0), "mixed chains");
+            const int mixed = mixedChains(precision, engine, settings);
+            check(mixed == (precision == Precision::Mixed ? count : 0), "mixed chains");
             const StepResult found = stepIn(precision, engine, x, f, settings);
             for (size_t i = 0; i < x.size(); i++)
                 x[i] += found.displacements[i];
