@@ -330,8 +330,11 @@ class Filaments(TiedFilaments):
             "mixed" computes what happens within a step in single precision, wherever that changes no result beyond its
             statistical error: for open filaments with harmonic lengths and an implicit scheme of the compiled engine,
             above zero temperature, without flow, while 4 h K/gamma_rot is at most 10^4, k l0^2/k_BT at most 10^9, and
-            noise changes lengths by 10^-5 of themselves in a step, or more.
-            Positions and forces are in double precision, and other filaments altogether; so are those of beam elements.
+            noise changes lengths by 10^-5 of themselves in a step, or more. For filaments with twist, k (1+2 k_BT
+            h/zeta)^(1/2) is at most 10^5 k_BT, with the stiffness k of twist and the friction zeta of a segment against
+            turning about itself, and no hands follow their helix.
+            Positions, twists and forces are in double precision, and other filaments altogether; so are those of beam
+            elements.
             "automatic" does so where it is faster as well, about twice as fast: where there are enough filaments of
             similar length, or few that are long. With the portable engine it is the same as "double".
             ``integrator.getNumMixedPrecisionChains()`` says for how many filaments the last step did so.

@@ -104,7 +104,7 @@ ChainEngine::ChainEngine(const vector<Chain>& chains, const vector<PieceOfChain>
             if (lanes > bestKernels().wide.lanes || !mayShareLanes(longest, chains[members[last].back()]))
                 break;
         }
-        if (!longest.closed && !hasRange(longest.stretching) && !longest.twist.isPresent())
+        if (!longest.closed && !hasRange(longest.stretching))
             implementation->wide.push_back(implementation->widePackOf(chains, first, last));
     }
     if (mayChange)

@@ -28,6 +28,7 @@ namespace cylchain {
 namespace CYLCHAIN_LOOPS {
 
 #include "lanes/VectorLanes-inl.h"
+#include "lanes/DoubleLanes-inl.h"
 #include "lanes/Transposition-inl.h"
 
 typedef ChainPack<Scalar> Pack;
@@ -45,6 +46,7 @@ typedef ChainPack<Scalar> Pack;
 #include "dynamics/ImplicitNoise-inl.h"
 #include "dynamics/ImplicitPositions-inl.h"
 #include "dynamics/SegmentEquations-inl.h"
+#include "dynamics/SweptAreas-inl.h"
 #include "dynamics/ImplicitTwist-inl.h"
 #include "dynamics/ImplicitEquations-inl.h"
 #include "dynamics/MetricForces-inl.h"

@@ -3,6 +3,7 @@
 
 #include "dynamics/ChainEngine.h"
 #include "lanes/Noise.h"
+#include <cstddef>
 #include <memory>
 #include <vector>
 
@@ -15,21 +16,35 @@ struct LaneTether : Tether {
 
 /** Twist of the chains of a pack: see ChainTwist. What fills up has no stiffness. */
 template <class Scalar> struct PackTwist {
+    /** Of the joint at each node, [node][lane]: the stiffness, and the angle at rest, a double as twists are. */
+    std::vector<Scalar> stiffness;
+    std::vector<double> rest;
     /**
-     * Of the joint at each node, [node][lane]: the stiffness, the angle at rest, how fast it is turned, and a torque
-     * that is there in any case. The last two are those of end frames.
+     * Of end frames, [end][lane], with the sign that twist has there: the torque, how fast they are turned, and by how
+     * much less for each torque of their joint.
      */
-    std::vector<Scalar> stiffness, rest, angularVelocity, torque;
-    /** The same of the friction of an end frame; 1e100 where none turns. */
-    std::vector<Scalar> frameFriction;
+    std::vector<double> torque, angularVelocity, frameMobility;
+    /** Their directions, [end][axis][lane]. */
+    std::vector<double> directions;
     /** Of each segment, [segment][lane]; nothing if chains have no twist. */
     std::vector<Scalar> friction;
-    /** The directions of end frames, [end][axis][lane]. */
-    std::vector<Scalar> directions;
-    /** Whether any chain has a frame at both ends, or is closed, so that all of it shares a torque. */
+    /** One for each lane whose chain has a joint to a frame at both ends, or is closed, so that all of it shares a torque. */
+    std::vector<Scalar> held;
+    /** Whether there is one. */
     bool isHeld = false;
-    /** Whether a frame turns against a friction. */
-    bool hasTurningFrames = false;
+    PackTwist() = default;
+    PackTwist(int segments, int lanes) {
+        const std::size_t numbers = (std::size_t) (segments+1)*lanes;
+        stiffness.resize(numbers);
+        rest.resize(numbers);
+        torque.resize(2*lanes);
+        angularVelocity.resize(2*lanes);
+        frameMobility.resize(2*lanes);
+        // Far from zero, so that joints have that of the segment which is there, and from where floats end.
+        friction.resize(numbers-lanes, 1e30);
+        directions.resize(6*lanes);
+        held.resize(lanes);
+    }
     bool isPresent() const {
         return !friction.empty();
     }

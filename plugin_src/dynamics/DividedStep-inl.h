@@ -38,44 +38,75 @@ inline int numTwists(const Pack& pack) {
     return pack.twist.isPresent() ? pack.segments+1 : 0;
 }
 
-/** Bring twists into lanes, less those at rest. */
-template <int W> void gatherTwists(const Pack& pack, const StepSettings& settings, typename Lanes<W>::Type* twists) {
-    typedef typename Lanes<W>::Type Real;
-    for (int node = 0; node < numTwists(pack); node++)
-        twists[node] = -loaded<Real>(pack.twist.rest, node);
-    for (int i = 0; i < W && pack.twist.isPresent(); i++) {
-        if (pack.chain[i] < 0)
-            continue;
-        const std::vector<double>& own = (*settings.twists)[pack.chain[i]];
-        for (std::size_t joint = 0; joint < own.size(); joint++)
-            lane(twists[joint], i) += own[joint];
-        if (pack.closed)
-            lane(twists[pack.segments], i) += own[0];
+/** Memory for the twists of a step: at its start, with what they are computed from, and how much they change. */
+struct TwistMemory {
+    Scratch twists, exact, changes;
+    template <int W> typename DoubleLanes<W>::Type* reserveChanges(const Pack& pack) {
+        return changes.reserve<typename DoubleLanes<W>::Type>(numTwists(pack)*DoubleLanes<W>::REGISTERS);
     }
+};
+
+/** Bring the vectors of segments into lanes, for chains with twist in double precision as well. */
+template <int W> void gatherExactSegments(const Pack& pack, const double* positions, const double* box,
+            [[maybe_unused]] TwistMemory& memory, StepStart<W>& start) {
+    constexpr int REGISTERS = DoubleLanes<W>::REGISTERS, lanes = W/REGISTERS;
+    if (REGISTERS == 1 || !pack.twist.isPresent())
+        gatherSegments<W>(pack, positions, box, start.segments);
+    if constexpr (REGISTERS == 1)
+        start.exact = start.segments;
+    else if (pack.twist.isPresent()) {
+        auto* const exact = memory.exact.reserve<Vector<typename DoubleLanes<W>::Type> >((pack.nodes-1)*REGISTERS);
+        forSegments<W>(pack, positions, box, [&] (int s, int i, const double* d) {
+            auto& segment = exact[s*REGISTERS+i/lanes];
+            lane(segment.x, i%lanes) = d[0];
+            lane(segment.y, i%lanes) = d[1];
+            lane(segment.z, i%lanes) = d[2];
+        });
+        for (int s = 0; s < pack.nodes-1; s++)
+            start.segments[s] = fromDouble<W>(exact+s*REGISTERS);
+        start.exact = exact;
+    }
+}
+
+/** Call a function with each twist in lanes: its chain and its number there, its node and its lane. */
+template <int W, class Function> CYLCHAIN_INLINE void forTwists(const Pack& pack, Function function) {
+    forPlacesOfLanes<W>(numTwists(pack), [&] (int node, int i) {
+        if (pack.chain[i] >= 0 && node <= pack.segmentsOfLane[i] && !(pack.closed && node == 0))
+            function(pack.chain[i], pack.closed ? node%pack.segments : node, node, i);
+    });
+}
+
+/** Bring twists into lanes, less those at rest. */
+template <int W> void gatherTwists(const Pack& pack, const StepSettings& settings, TwistMemory& memory,
+            StepStart<W>& start) {
+    start.twists = memory.twists.reserve<typename Lanes<W>::Type>(numTwists(pack));
+    for (int node = 0; node < numTwists(pack); node++)
+        start.twists[node] = typename Lanes<W>::Type {};
+    forTwists<W>(pack, [&] (int chain, int joint, int node, int i) {
+        lane(start.twists[node], i) = (*settings.twists)[chain][joint]-pack.twist.rest[node*W+i];
+    });
 }
 
 /** Write how much the twists of some lanes change. */
 template <int W> void scatterTwists(const Pack& pack, const StepSettings& settings,
-            typename Lanes<W>::Type* changes, const bool* taken) {
-    for (int i = 0; i < W && pack.twist.isPresent(); i++) {
-        if (pack.chain[i] < 0 || (taken != NULL && !taken[i]))
-            continue;
-        std::vector<double>& own = (*settings.twistChanges)[pack.chain[i]];
-        for (std::size_t joint = 0; joint < own.size(); joint++)
-            own[joint] = lane(changes[pack.closed && joint == 0 ? pack.segments : joint], i);
-    }
+            const typename DoubleLanes<W>::Type* changes, const bool* taken) {
+    const double* const all = reinterpret_cast<const double*>(changes);
+    forTwists<W>(pack, [&] (int chain, int joint, int node, int i) {
+        if (taken == NULL || taken[i])
+            (*settings.twistChanges)[chain][joint] = all[node*W+i];
+    });
 }
 
 /** Where a step would begin if its nodes had moved already, and its twists changed. */
 template <int W> void moveStart(const Pack& pack, const StepStart<W>& start,
-            const Vector<typename Lanes<W>::Type>* moved, const typename Lanes<W>::Type* turned, bool needsNodes,
+            const Vector<typename Lanes<W>::Type>* moved, const typename DoubleLanes<W>::Type* turned, bool needsNodes,
             const StepStart<W>& result) {
     for (int node = 0; needsNodes && node < pack.nodes; node++)
         result.nodes[node] = start.nodes[node]+moved[node];
     for (int s = 0; s < pack.nodes-1; s++)
         result.segments[s] = start.segments[s]+(moved[s+1]-moved[s]);
     for (int node = 0; node < numTwists(pack); node++)
-        result.twists[node] = start.twists[node]+turned[node];
+        result.twists[node] = start.twists[node]+fromDouble<W>(turned+node*DoubleLanes<W>::REGISTERS);
     for (std::size_t i = 0; i < pack.tethers.size(); i++) {
         const LaneTether& tether = pack.tethers[i];
         Vector<typename Lanes<W>::Type> change = moved[tether.node];
@@ -88,11 +119,11 @@ template <int W> void moveStart(const Pack& pack, const StepStart<W>& start,
 /** Take one step of the scheme that begins from somewhere, and return the number of iterations: see ImplicitStep. */
 template <int W> using TakeStep = int (*)(const Pack& pack, const StepSettings& settings, const StepStart<W>& start,
         const Vector<typename Lanes<W>::Type>* forces, Vector<typename Lanes<W>::Type>* y, bool* failed,
-        typename Lanes<W>::Type* turned);
+        typename DoubleLanes<W>::Type* turned);
 
 template <int W, bool CLOSED> int takeImplicitStep(const Pack& pack, const StepSettings& settings,
             const StepStart<W>& start, const Vector<typename Lanes<W>::Type>* forces,
-            Vector<typename Lanes<W>::Type>* y, bool* failed, typename Lanes<W>::Type* turned) {
+            Vector<typename Lanes<W>::Type>* y, bool* failed, typename DoubleLanes<W>::Type* turned) {
     static thread_local typename ImplicitStep<W, CLOSED>::Memory memory;
     return ImplicitStep<W, CLOSED>(pack, settings, start, memory).take(forces, y, failed, turned);
 }
@@ -103,20 +134,21 @@ template <int W, bool CLOSED> int takeImplicitStep(const Pack& pack, const StepS
  */
 template <int W> void divideStep(TakeStep<W> takeStep, const Pack& pack, const StepStart<W>& start,
             const Vector<typename Lanes<W>::Type>* f, StepSettings settings, Vector<typename Lanes<W>::Type>* y,
-            bool* failed, typename Lanes<W>::Type* turned, const int* planned) {
+            bool* failed, typename DoubleLanes<W>::Type* turned, const int* planned) {
     typedef typename Lanes<W>::Type Real;
-    static thread_local Scratch vectors, tethers, twists;
+    static thread_local Scratch vectors, tethers;
+    static thread_local TwistMemory ofWhole, ofPart;
     const double h = settings.stepSize;
     const std::uint64_t step = settings.step;
     const int level = settings.level, n = pack.nodes;
     const MeanOfParts<W> mean(pack, settings);
     Vector<Real>* moved = vectors.reserve<Vector<Real> >(4*n);
     Vector<Real>* change = moved+n;
-    const int joints = numTwists(pack);
-    Real* const turnedSoFar = twists.reserve<Real>(3*joints);
-    Real* const turnedInPart = turnedSoFar+joints;
+    const int joints = numTwists(pack), turns = joints*DoubleLanes<W>::REGISTERS;
+    auto* const turnedSoFar = ofWhole.reserveChanges<W>(pack);
+    auto* const turnedInPart = ofPart.reserveChanges<W>(pack);
     const StepStart<W> from = {moved+2*n, moved+3*n, tethers.reserve<TetherVector>(pack.tethers.size()),
-            turnedSoFar+2*joints};
+            ofPart.twists.reserve<Real>(joints), start.exact, moved};
     for (int division = 1; division <= LARGEST_DIVISION_OF_CHAIN && level+division <= LARGEST_LEVEL; division++) {
         bool isTried[W], anyIsTried = false;
         for (int i = 0; i < W; i++) {
@@ -131,8 +163,8 @@ template <int W> void divideStep(TakeStep<W> takeStep, const Pack& pack, const S
         bool failedNow[W] = {}, failedPart[W];
         for (int node = 0; node < n; node++)
             moved[node] = Vector<Real> {};
-        for (int joint = 0; joint < joints; joint++)
-            turnedSoFar[joint] = Real{};
+        for (int turn = 0; turn < turns; turn++)
+            turnedSoFar[turn] = typename DoubleLanes<W>::Type {};
         bool hope = true;
         for (int part = 0; part < parts && hope; part++) {
             settings.step = (step<<division)+part;
@@ -140,8 +172,8 @@ template <int W> void divideStep(TakeStep<W> takeStep, const Pack& pack, const S
             takeStep(pack, settings, from, f, change, failedPart, turnedInPart);
             for (int node = 0; node < n; node++)
                 moved[node] = moved[node]+change[node];
-            for (int joint = 0; joint < joints; joint++)
-                turnedSoFar[joint] = turnedSoFar[joint]+turnedInPart[joint];
+            for (int turn = 0; turn < turns; turn++)
+                turnedSoFar[turn] = turnedSoFar[turn]+turnedInPart[turn];
             mean.add(part, parts, isTried);
             hope = false;
             for (int i = 0; i < W; i++) {
@@ -159,7 +191,7 @@ template <int W> void divideStep(TakeStep<W> takeStep, const Pack& pack, const S
                     lane(y[node].z, i) = lane(moved[node].z, i);
                 }
                 for (int joint = 0; joint < joints; joint++)
-                    lane(turned[joint], i) = lane(turnedSoFar[joint], i);
+                    reinterpret_cast<double*>(turned)[joint*W+i] = reinterpret_cast<double*>(turnedSoFar)[joint*W+i];
             }
             any |= failed[i];
         }
@@ -170,10 +202,11 @@ template <int W> void divideStep(TakeStep<W> takeStep, const Pack& pack, const S
 
 /** Bring what a step begins with into lanes. */
 template <int W> __attribute__((noinline)) void gatherStepStart(const Pack& pack, const double* positions,
-            const double* box, bool needsNodes, const StepStart<W>& start) {
-    if (needsNodes)
+            const double* box, const StepSettings& settings, TwistMemory& memory, StepStart<W>& start) {
+    if (settings.flow.present)
         gatherStart<W>(pack, positions, box, start.nodes);
-    gatherSegments<W>(pack, positions, box, start.segments);
+    gatherExactSegments<W>(pack, positions, box, memory, start);
+    gatherTwists<W>(pack, settings, memory, start);
     for (std::size_t i = 0; i < pack.tethers.size(); i++) {
         tetherVector(pack, pack.tethers[i], positions, box, start.tethers[i].d);
         if (pack.planar)
@@ -184,15 +217,14 @@ template <int W> __attribute__((noinline)) void gatherStepStart(const Pack& pack
 template <int W> Instability stepPackImplicitly(const Pack& pack, const double* positions, const double* forces,
             const double* box, const StepSettings& settings, double* displacements) {
     typedef typename Lanes<W>::Type Real;
-    static thread_local Scratch vectors, tethers, twists;
+    static thread_local Scratch vectors, tethers;
+    static thread_local TwistMemory twists;
     const int n = pack.nodes;
     Vector<Real>* f = vectors.reserve<Vector<Real> >(4*n);
     Vector<Real>* y = f+n;
-    Real* const turned = twists.reserve<Real>(2*numTwists(pack));
-    const StepStart<W> start = {y+n, y+2*n, tethers.reserve<TetherVector>(pack.tethers.size()),
-            turned+numTwists(pack)};
-    gatherStepStart<W>(pack, positions, box, settings.flow.present, start);
-    gatherTwists<W>(pack, settings, start.twists);
+    StepStart<W> start = {y+n, y+2*n, tethers.reserve<TetherVector>(pack.tethers.size())};
+    gatherStepStart<W>(pack, positions, box, settings, twists, start);
+    auto* const turned = twists.reserveChanges<W>(pack);
     gatherForces<W>(pack, forces, f);
     bool failed[W];
     Instability result;

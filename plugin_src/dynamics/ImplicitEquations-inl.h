@@ -16,7 +16,7 @@ public:
     typedef typename Coordinates<W>::Factors Factors;
     ImplicitEquations(const ImplicitState<W>& step, ImplicitTwist<W, CLOSED>& twist, Memory& memory) : step(step),
             pack(step.pack), n(step.n), segments(step.segments), change(step.change), twist(twist),
-            isTwisted(HAS_TWIST && pack.twist.isPresent()), ofSegments(step), band(pack, memory) {
+            isTwisted(pack.twist.isPresent()), ofSegments(step), band(pack, memory) {
     }
     /**
      * Linearise the equations around y, and eliminate the nodes from first to last.
@@ -27,9 +27,8 @@ public:
         ofSegments.begin(iteration);
         if (step.settings.flow.present)
             ofSegments.addDragOfFlow(y);
-        if constexpr (HAS_TWIST)
-            if (isTwisted)
-                twist.addForces(y, iteration > 0 || step.settings.flow.present);
+        if (isTwisted)
+            twist.addForces(y, iteration > 0 || step.settings.flow.present);
         Row rows[3];
         Row *before = rows, *here = rows+1, *after = rows+2;
         // Roots and divisions take long: those of the segment ahead come before the node is eliminated.
@@ -172,12 +171,10 @@ private:
         segment.multiplier = tension+segment.shift*segment.newTangent.dot(change[s+1]-change[s]);
     }
     CYLCHAIN_INLINE void describeNew(const Vec* y, int s, Geometry& geometry) const {
-        if constexpr (HAS_TWIST)
-            if (isTwisted) {
-                geometry = twist.getSegment(s);
-                return;
-            }
-        ofSegments.describeNew(y, s, geometry);
+        if (isTwisted)
+            geometry = twist.getSegment(s);
+        else
+            ofSegments.describeNew(y, s, geometry);
     }
     /** Add the terms of couplings of a segment, the next ones, to the equations of its nodes. */
     void addTerms(int s, int& next, Row& here, Row& after) {

@@ -36,21 +36,19 @@ template <class Real> struct ImplicitSegment : IteratedSegment<Real> {
 
 /** What a step keeps of the twist of a joint, and of the segment behind it: see ImplicitTwist-inl.h. */
 template <class Real> struct TwistedJoint {
-    // The torque is implicit times the change of the twist, and constant; what of that change an end frame makes, and
-    // by how much less for each torque of the joint.
-    Real implicit, constant, turnedByEnd, givesWay;
+    // The torque is implicit times the change of the twist, and constant.
+    Real implicit, constant;
     // What joins the turns of both segments: implicit, less the friction of hands against both.
     Real coupling;
     // Of the segment: its friction over the step, the random torque, and what the elimination leaves.
     Real friction, random, inversePivot, border;
     // What this joint has of all torques when each twist changes by as much.
     Real share;
-    // For some new nodes: the area swept, the torque, how the segment turns.
-    Real swept, torque, turn;
+    // For some new nodes: the torque, how the segment turns.
+    Real torque, turn;
     // In the middle of the step: half the curvature binormal, and one over one plus the cosine of the joint.
     Vector<Real> curvature;
     Real perCosine;
-    NewSegmentGeometry<Real> segment;
 };
 
 /** The vector from the point of a tether to its node. */
@@ -75,7 +73,13 @@ template <int W> struct StepStart {
     Vector<typename Lanes<W>::Type> *nodes, *segments;
     TetherVector* tethers;
     /** By how much joints are twisted more than at rest, if they can be. */
-    typename Lanes<W>::Type* twists;
+    typename Lanes<W>::Type* twists = NULL;
+    /**
+     * For chains with twist, the vectors of segments in double precision, and if these are those before a step of which
+     * this is a part, how far the nodes have moved since then, or NULL.
+     */
+    const Vector<typename DoubleLanes<W>::Type>* exact = NULL;
+    const Vector<typename Lanes<W>::Type>* moved = NULL;
 };
 
 /** The stages that steps are made of: the one of scheme "implicit", and the two of second order. */
@@ -93,7 +97,7 @@ template <int W> class ImplicitState {
     typedef Vector<Real> Vec;
 public:
     struct Memory {
-        Scratch segments, vectors, tethers, joints, gradients, responses;
+        Scratch segments, vectors, tethers, joints, newSegments, gradients, responses;
     };
     ImplicitState(const Pack& pack, const StepSettings& settings, const StepStart<W>& start, Memory& memory) :
             pack(pack), settings(settings), start(start), n(pack.nodes), h(settings.stepSize), kT(settings.kT),
@@ -104,6 +108,8 @@ public:
             loads(settings.flow.present || pack.twist.isPresent() ? f+3*n : f), change(f+n), rest(f+2*n),
             external(twoStages ? f+4*n : f), random(twoStages ? f+5*n : f), drift(twoStages ? f+6*n : f),
             joints(memory.joints.template reserve<TwistedJoint<Real> >(pack.twist.isPresent() ? n : 0)),
+            newSegments(memory.newSegments.template reserve<NewSegmentGeometry<Real> >(
+                    pack.twist.isPresent() ? n : 0)),
             gradient(memory.gradients.template reserve<Vec>(pack.twist.isHeld ? 3*n : 0)),
             responsesOfTensions(memory.responses.template reserve<Real>(pack.twist.isHeld ? n : 0)) {
     }
@@ -119,9 +125,10 @@ public:
     Vec *const f, *const loads, *const change, *const rest;
     // Forces from outside, of noise and the metric ones; all of them are f if there is one stage alone.
     Vec *const external, *const random, *const drift;
-    // Of twist, if there is any; the others are the gradient of what a chain shares, memory of its own, and how
-    // tensions respond to that gradient.
+    // Of twist, if there is any, with the segments of an iteration; the others are the gradient of what a chain shares,
+    // memory of its own, and how tensions respond to that gradient.
     TwistedJoint<Real>* const joints;
+    NewSegmentGeometry<Real>* const newSegments;
     Vec* const gradient;
     Real* const responsesOfTensions;
     Stage stage = Stage::Only;

@@ -53,7 +53,8 @@ public:
      * @param turned  receives by how much twists change, if chains have any
      * @return the number of iterations
      */
-    __attribute__((noinline)) int take(const Vec* forces, Vec* y, bool* failed, Real* turned) {
+    __attribute__((noinline)) int take(const Vec* forces, Vec* y, bool* failed,
+            typename DoubleLanes<W>::Type* turned) {
         begin(forces, y);
         for (int i = 0; i < W; i++)
             failed[i] = false;
@@ -78,15 +79,13 @@ public:
         stages.describe();
         if (step.settings.kT > 0)
             noise.draw();
-        if constexpr (HAS_TWIST)
-            if (step.pack.twist.isPresent())
-                twist.begin();
+        if (step.pack.twist.isPresent())
+            twist.begin();
     }
     /** Find by how much twists have changed when nodes have moved by y. */
-    void findTwists(const Vec* y, Real* turned) {
-        if constexpr (HAS_TWIST)
-            if (step.pack.twist.isPresent())
-                twist.findChanges(y, turned);
+    void findTwists(const Vec* y, typename DoubleLanes<W>::Type* turned) {
+        if (step.pack.twist.isPresent())
+            twist.findChanges(y, turned);
     }
     int getNumStages() const {
         return step.twoStages ? 2 : 1;
@@ -102,9 +101,8 @@ public:
     void eliminate(const Vec* y, int iteration) {
         equations.eliminate(y, iteration);
         equations.template substitute<Goal::Find>();
-        if constexpr (HAS_TWIST)
-            if (step.pack.twist.isHeld)
-                twist.shareTorque(equations, iteration);
+        if (step.pack.twist.isHeld)
+            twist.shareTorque(equations, iteration);
     }
     /** Ask for the memory that eliminate() begins with. */
     void prefetchStart() const {

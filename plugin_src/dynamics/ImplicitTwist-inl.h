@@ -15,63 +15,18 @@
  * end frame that turns against a friction Z does so by h/Z (torque + random - T), which makes its joint softer.
  */
 
-/** Whether there are packs with twist: in double precision alone. */
-constexpr bool HAS_TWIST = sizeof(Scalar) == sizeof(double);
-
 /** By this much, nodes may give way to the torque that all of a chain shares without its being in their equations. */
 const Scalar NEARLY_RIGID = 0.1;
-
-/** tan(pi/8). */
-const Scalar TANGENT_OF_EIGHTH = M_SQRT2-1;
-
-/** The angle whose tangent is within 0.2, to 10^-17 there. */
-template <class Real> CYLCHAIN_INLINE Real arctangent(Real tangent) {
-    const Real square = tangent*tangent;
-    Real result = splat<Real>(1.0/21);
-#pragma GCC unroll 10
-    for (int k = 19; k > 0; k -= 2)
-        result = splat<Real>(1.0/k)-square*result;
-    return result*tangent;
-}
-
-/** The angle of a complex number x+iy, in (-pi, pi). */
-template <class Real> CYLCHAIN_INLINE Real argument(Real x, Real y) {
-    const Real zero = Real{}, tangent = y/x;
-    Real square = x > zero ? tangent*tangent : splat<Real>(1);
-    bool isSmall = true;
-    for (int i = 0; i < LANE_COUNT<Real>; i++)
-        isSmall &= lane(square, i) < 0.04;
-    if (isSmall)
-        return arctangent<Real>(tangent);
-    // Of an angle within pi/4, half of what it is beyond pi/8.
-    const Real across = y < zero ? -y : y, along = x < zero ? -x : x;
-    const Real least = lesser<Real>(across, along), most = larger<Real>(across, along)+TINY;
-    const Real beyond = (least-TANGENT_OF_EIGHTH*most)/(most+TANGENT_OF_EIGHTH*least);
-    Real angle = M_PI/8+2*arctangent<Real>(beyond/(1+root(1+beyond*beyond)));
-    angle = across > along ? M_PI/2-angle : angle;
-    angle = x < zero ? M_PI-angle : angle;
-    return y < zero ? -angle : angle;
-}
-
-/**
- * The area on the unit sphere that the great circle from a to b sweeps as it moves to that from newA to newB: positive
- * if a, b, newB, newA go around it counterclockwise, as seen from outside.
- */
-template <class Real> CYLCHAIN_INLINE Real sweptArea(const Vector<Real>& a, const Vector<Real>& b,
-        const Vector<Real>& newA, const Vector<Real>& newB) {
-    // The sum of two triangles.
-    const Real across = 1+a.dot(newB);
-    const Real x1 = across+a.dot(b)+b.dot(newB), y1 = a.dot(crossProduct(b, newB));
-    const Real x2 = across+newA.dot(newB)+a.dot(newA), y2 = a.dot(crossProduct(newB, newA));
-    return 2*argument<Real>(x1*x2-y1*y2, x1*y2+x2*y1);
-}
 
 template <int W, bool CLOSED> class ImplicitTwist {
     typedef typename Lanes<W>::Type Real;
     typedef Vector<Real> Vec;
+    typedef typename DoubleLanes<W>::Type Double;
+    static constexpr int REGISTERS = DoubleLanes<W>::REGISTERS;
 public:
     explicit ImplicitTwist(ImplicitState<W>& step) : step(step), pack(step.pack), twist(pack.twist),
-            ofSegments(step), segments(pack.segments), first(CLOSED ? 1 : 0), joints(step.joints) {
+            ofSegments(step), segments(pack.segments), first(CLOSED ? 1 : 0), joints(step.joints),
+            newSegments(step.newSegments) {
         for (int end = 0; end < 2 && !CLOSED && twist.isPresent(); end++)
             directions[end] = {loaded<Real>(twist.directions, 3*end), loaded<Real>(twist.directions, 3*end+1),
                     loaded<Real>(twist.directions, 3*end+2)};
@@ -80,24 +35,28 @@ public:
     }
     /** Describe the start of a step, draw the noise, and eliminate the turns of segments. */
     __attribute__((noinline)) void begin() {
+        Real frictionBefore = loaded<Real>(twist.friction, CLOSED ? segments-1 : 0);
         for (int s = 0; s <= segments; s++) {
             TwistedJoint<Real>& joint = joints[s];
             const Real stiffness = loaded<Real>(twist.stiffness, s);
-            Real friction = loaded<Real>(twist.friction, std::min(s, segments-1));
+            const Real friction = s < segments ? loaded<Real>(twist.friction, s) : frictionBefore;
             joint.friction = friction*(1/step.h);
-            const Real ofFrame = loaded<Real>(twist.frameFriction, s);
-            friction = lesser<Real>(friction, lesser<Real>(ofFrame, loaded<Real>(twist.friction, before(s))));
-            const Real theta = larger<Real>(splat<Real>(0.5), 1-friction/(4*step.h*stiffness+TINY));
-            // A frame that turns against a friction has turned where the torque is known: it is eliminated here.
-            joint.givesWay = step.h/ofFrame;
-            const Real softer = 1/(1+stiffness*theta*joint.givesWay);
-            joint.implicit = joint.coupling = stiffness*theta*softer;
-            joint.constant = (stiffness*step.start.twists[s]+loaded<Real>(twist.torque, s))*softer;
-            joint.turnedByEnd = loaded<Real>(twist.angularVelocity, s)*step.h;
+            const Real least = lesser<Real>(friction, frictionBefore);
+            frictionBefore = friction;
+            const Real theta = larger<Real>(splat<Real>(0.5), 1-least/(4*step.h*stiffness+TINY));
+            joint.implicit = joint.coupling = stiffness*theta;
+            joint.constant = stiffness*step.start.twists[s];
             joint.random = Real{};
             // The noise of equilibrium, for now.
-            joint.torque = root(stiffness*(2*theta-1)*step.kT)*softer;
+            joint.torque = root(stiffness*(2*theta-1)*step.kT);
         }
+        forEnds([&] (int s, int i, int end) {
+            double& turn = turnsOfFrames[end];
+            turn = twist.angularVelocity[end]*step.settings.stepSize;
+            if (twist.frameMobility[end] > 0)
+                turn += letFrameTurn(s, i, end);
+            lane(joints[s].constant, i) += twist.torque[end]+lane(joints[s].implicit, i)*turn;
+        });
         if (step.settings.kT > 0)
             draw();
         if (step.settings.turnedPairs != NULL)
@@ -142,7 +101,7 @@ public:
     /** A segment as addForces() has found it. */
     CYLCHAIN_INLINE NewSegmentGeometry<Real> getSegment(int s) const {
         if (haveMoved)
-            return joints[s].segment;
+            return newSegments[s];
         const IteratedSegment<Real>& start = step.segments[s];
         return {{start.difference, start.tangent, start.length, start.inverse}, start.tangent, start.inverse};
     }
@@ -194,16 +153,24 @@ public:
         here.upper = here.upper+mixed;
     }
     /** Find how the twists have changed when the nodes have moved by y. */
-    __attribute__((noinline)) void findChanges(const Vec* y, Real* changes) {
-        solve<Moment::End>(y);
-        for (int s = 0; s <= segments; s++) {
-            const TwistedJoint<Real>& joint = joints[s];
-            changes[s] = joint.swept+joint.turnedByEnd-joint.givesWay*joint.torque;
+    __attribute__((noinline)) void findChanges(const Vec* y, Double* changes) {
+        findSweptAreas<W, CLOSED>(pack, step.start, y, changes);
+        solve<Moment::End>(y, changes);
+        for (int place = 0; place < (segments+1)*REGISTERS; place++) {
+            const int s = place/REGISTERS, part = place%REGISTERS;
             if (s < segments || CLOSED)
-                changes[s] = changes[s]+joints[s < segments ? s : 0].turn;
+                changes[place] = changes[place]+inDouble<W>(joints[s < segments ? s : 0].turn, part);
             if (s > 0)
-                changes[s] = changes[s]-joints[s-1].turn;
+                changes[place] = changes[place]-inDouble<W>(joints[s-1].turn, part);
         }
+        forEnds([&] (int s, int i, int end) {
+            double turn = turnsOfFrames[end];
+            if (twist.frameMobility[end] > 0) {
+                Real torque = joints[s].torque+joints[s].implicit*twistOfTurns(s);
+                turn -= twist.frameMobility[end]*step.settings.stepSize*lane(torque, i);
+            }
+            reinterpret_cast<double*>(changes+s*REGISTERS)[i] += turn;
+        });
     }
 private:
     ImplicitState<W>& step;
@@ -212,8 +179,11 @@ private:
     const SegmentEquations<W> ofSegments;
     const int segments, first;
     TwistedJoint<Real>* const joints;
+    NewSegmentGeometry<Real>* const newSegments;
     Vec directions[2];
-    /** Whether torques have been found for nodes that have moved, whose segments joints know. */
+    /** By how much frames turn without the torques of their joints, as in the lists of these. */
+    double turnsOfFrames[2*W];
+    /** Whether torques have been found for nodes that have moved, whose segments are known. */
     bool haveMoved = false;
     /** Whether a chain is shorter than others. */
     bool isFilledUp = false;
@@ -234,36 +204,48 @@ private:
         const Vec& frame = directions[1];
         return {ofOwn(s, tangent.x, frame.x), ofOwn(s, tangent.y, frame.y), ofOwn(s, tangent.z, frame.z)};
     }
-    /** The segment before a joint, or at the first end of an open chain, the one behind it. */
-    int before(int s) const {
-        return s > 0 ? s-1 : CLOSED ? segments-1 : 0;
-    }
     /** The joint before a segment. */
     int jointBefore(int s) const {
         return s == 0 && CLOSED ? segments : s;
+    }
+    /** Call a function with the joint and the lane of each end of open chains, and where its frame is in lists. */
+    template <class Function> CYLCHAIN_INLINE void forEnds(Function function) const {
+        for (int i = 0; i < W && !CLOSED; i++) {
+            function(0, i, i);
+            function(pack.segmentsOfLane[i], i, W+i);
+        }
     }
     void draw() {
         const NoiseKey key = noiseKey(step.settings);
         NoisePlaces<W> places = noisePlaces<W>(pack);
         // Chains with twist have no friction of nodes, whose numbers these would be.
-        Real normals[4];
+        Real normals[2];
         for (int s = 0; s <= segments; s++, places.part += 1) {
-            drawNormals<W, 2>(key, NoiseKind::Node, places, normals);
+            drawNormals<W, 1>(key, NoiseKind::Node, places, normals);
             TwistedJoint<Real>& joint = joints[s];
             joint.constant = joint.constant-normals[0]*joint.torque;
             joint.random = normals[1]*root(2*step.kT*joint.friction);
         }
-        for (int i = 0; i < W && twist.hasTurningFrames; i++) {
-            if (pack.chain[i] < 0)
-                continue;
-            // Behind the numbers of tethers.
-            Scalar ofEnds[4];
-            drawNormals<1, 2>(key, NoiseKind::Tether, {(Word) pack.chain[i], (Word) UINT32_MAX}, ofEnds);
-            for (int end = 0; end < 2; end++) {
-                TwistedJoint<Real>& joint = joints[end == 0 ? 0 : pack.segmentsOfLane[i]];
-                lane(joint.turnedByEnd, i) += ofEnds[end]*std::sqrt(2*step.kT*lane(joint.givesWay, i));
-            }
-        }
+    }
+    /**
+     * Let the frame at an end give way to the torque of its joint, against a friction: it has turned where that torque
+     * is known, and is eliminated here. Returns by how much its noise turns it.
+     */
+    double letFrameTurn(int s, int i, int end) {
+        TwistedJoint<Real>& joint = joints[s];
+        const double stiffness = twist.stiffness[s*W+i], givesWay = twist.frameMobility[end]*step.settings.stepSize;
+        const double theta = std::fmax(lane(joint.implicit, i)/stiffness, 1-1/(4*stiffness*givesWay));
+        const double softer = 1/(1+stiffness*theta*givesWay), kT = step.settings.kT;
+        lane(joint.implicit, i) = lane(joint.coupling, i) = stiffness*theta*softer;
+        lane(joint.constant, i) *= softer;
+        lane(joint.torque, i) = std::sqrt(stiffness*(2*theta-1)*kT)*softer;
+        if (kT <= 0)
+            return 0;
+        // Behind the numbers of tethers.
+        Scalar normals[2];
+        drawNormals<1, 1>(noiseKey(step.settings), NoiseKind::Tether, {(Word) pack.chain[i], (Word) UINT32_MAX},
+                normals);
+        return normals[end/W]*std::sqrt(2*kT*givesWay);
     }
     void addTurnedPairs() {
         const double kT = step.settings.kT, perTime = 1/step.h;
@@ -293,40 +275,44 @@ private:
     }
     /** Eliminate the turns of segments, and find how torques respond to a change of all twists. */
     void factorise() {
+        // What a segment has beyond the joint behind it. A difference of pivots would lose the friction in rounding.
+        Real own = joints[jointBefore(0)].implicit;
         for (int s = 0; s < segments; s++) {
-            Real pivot = joints[s].friction+joints[jointBefore(s)].implicit+joints[s+1].implicit;
-            if (CLOSED && s == 0)
+            if (s > 0) {
+                const Real stiffness = joints[s].implicit, coupling = joints[s].coupling;
+                own = (stiffness*own+(stiffness-coupling)*(stiffness+coupling))*joints[s-1].inversePivot;
+            }
+            own = own+joints[s].friction;
+            Real pivot = own+joints[s+1].implicit;
+            if (CLOSED && s == 0) {
+                own = own+pivot;
                 pivot = pivot+pivot;
+            }
             if (CLOSED && s == segments-1) {
                 const Real last = joints[segments].coupling;
                 pivot = pivot+last*last*(2*joints[0].inversePivot);
             }
-            if (s > 0)
-                pivot = pivot-joints[s].coupling*joints[s].coupling*joints[s-1].inversePivot;
-            joints[s].inversePivot = 1/pivot;
+            // What fills up does not turn.
+            joints[s].inversePivot = ofOwn(s, 1/pivot, Real{});
         }
         if (CLOSED) {
             // By Sherman and Morrison, for the coupling of the last segment and the first.
             const Real last = joints[segments].coupling, diagonal = 0.5/joints[0].inversePivot;
             corner = last/diagonal;
-            for (int s = 0; s < segments; s++)
-                joints[s].turn = s == 0 ? -diagonal : Real{};
-            joints[segments-1].turn = joints[segments-1].turn-last;
-            substitute();
+            substitute([&] (int s) {return s == 0 ? -diagonal : s == segments-1 ? -last : Real{};});
             for (int s = 0; s < segments; s++)
                 joints[s].border = joints[s].turn;
             perCorner = 1/(1+joints[0].border+corner*joints[segments-1].border);
         }
         if (!twist.isHeld)
             return;
-        for (int s = 0; s < segments; s++)
-            joints[s].turn = joints[s+1].implicit-joints[jointBefore(s)].implicit;
-        substitute();
+        substitute([&] (int s) {return joints[s+1].implicit-joints[jointBefore(s)].implicit;});
         if (CLOSED)
             closeRing();
         shared = Real{};
+        const Real held = loaded<Real>(twist.held, 0);
         for (int s = first; s <= segments; s++) {
-            joints[s].share = joints[s].implicit*(1+twistOfTurns(s));
+            joints[s].share = held*joints[s].implicit*(1+twistOfTurns(s));
             shared = shared+joints[s].share;
         }
         for (int s = first; s <= segments; s++)
@@ -341,15 +327,19 @@ private:
             result = result-joints[s-1].turn;
         return result;
     }
-    /** Solve the equations of open chains for turns, in which the right sides are. */
-    void substitute() {
-        for (int s = 1; s < segments; s++)
-            joints[s].turn = joints[s].turn+joints[s].coupling*joints[s-1].inversePivot*joints[s-1].turn;
+    /** Solve the equations of open chains for turns, with a function of their right sides. */
+    template <class Function> CYLCHAIN_INLINE void substitute(Function right) {
+        Real part = Real{};
+        for (int s = 0; s < segments; s++) {
+            part = right(s)+joints[s].coupling*part;
+            joints[s].turn = part;
+            part = part*joints[s].inversePivot;
+        }
+        part = Real{};
         for (int s = segments-1; s >= 0; s--) {
-            Real right = joints[s].turn;
-            if (s < segments-1)
-                right = right+joints[s+1].coupling*joints[s+1].turn;
-            joints[s].turn = right*joints[s].inversePivot;
+            part = (joints[s].turn+part)*joints[s].inversePivot;
+            joints[s].turn = part;
+            part = part*joints[s].coupling;
         }
     }
     void closeRing() {
@@ -359,8 +349,8 @@ private:
     }
     /** What torques are found for: the start of a step, or nodes in an iteration or after the last one. */
     enum class Moment {Start, Iteration, End};
-    /** Find the turns and torques for new nodes. */
-    template <Moment MOMENT> void solve(const Vec* y) {
+    /** Find the turns for new nodes, and the torques as if there were none. */
+    template <Moment MOMENT> void solve(const Vec* y, const Double* areas = NULL) {
         Vec tangent = directions[0], newTangent = directions[0], middle = directions[0];
         for (int s = 0; s <= segments; s++) {
             TwistedJoint<Real>& joint = joints[s];
@@ -371,41 +361,33 @@ private:
                 if constexpr (MOMENT == Moment::Start)
                     middle = tangent;
                 else if constexpr (MOMENT == Moment::Iteration) {
-                    ofSegments.describeNew(y, s, joint.segment);
-                    newTangent = directionAt(s, joint.segment.tangent);
-                    middle = directionAt(s, joint.segment.middleTangent);
-                }
-                else {
-                    const Vec difference = start.difference+(y[s+1]-y[s]);
-                    newTangent = directionAt(s, difference*(1/root(difference.dot(difference))));
+                    ofSegments.describeNew(y, s, newSegments[s]);
+                    newTangent = directionAt(s, newSegments[s].tangent);
+                    middle = directionAt(s, newSegments[s].middleTangent);
                 }
             }
             else
                 tangent = newTangent = middle = directions[1];
             if (s < first)
                 continue;
-            Real change = joint.turnedByEnd;
-            if constexpr (MOMENT != Moment::Start) {
-                joint.swept = sweptArea<Real>(before, tangent, newBefore, newTangent);
-                change = change+joint.swept;
-            }
+            joint.torque = joint.constant;
+            if constexpr (MOMENT == Moment::Iteration)
+                joint.torque = joint.torque+joint.implicit*sweptArea<Real>(before, tangent, newBefore, newTangent);
+            if constexpr (MOMENT == Moment::End)
+                joint.torque = joint.torque+joint.implicit*fromDouble<W>(areas+s*REGISTERS);
             if constexpr (MOMENT != Moment::End) {
                 joint.perCosine = 1/(1+middleBefore.dot(middle)+TINY);
                 joint.curvature = crossProduct(middleBefore, middle)*joint.perCosine;
                 joint.perCosine = ofOwn(s, joint.perCosine, Real{});
             }
-            joint.torque = joint.implicit*change+joint.constant;
         }
-        for (int s = 0; s < segments; s++)
-            joints[s].turn = joints[s].random+joints[s+1].torque-joints[jointBefore(s)].torque;
-        substitute();
+        substitute([&] (int s) {return joints[s].random+joints[s+1].torque-joints[jointBefore(s)].torque;});
         if (CLOSED)
             closeRing();
-        for (int s = first; s <= segments; s++)
-            joints[s].torque = joints[s].torque+joints[s].implicit*twistOfTurns(s);
     }
-    /** Find the force and the gradient of a joint, on either of its segments, as if that had the length one. */
-    CYLCHAIN_INLINE void findForces(int s, Vec& force, Vec& gradient) const {
+    /** Find the torque of a joint, its force and its gradient, on either segment as if that had the length one. */
+    CYLCHAIN_INLINE void findForces(int s, Vec& force, Vec& gradient) {
+        joints[s].torque = joints[s].torque+joints[s].implicit*twistOfTurns(s);
         force = joints[s].curvature*joints[s].torque;
         if (twist.isHeld)
             gradient = joints[s].curvature*joints[s].share;

@@ -63,14 +63,8 @@ void fillTwist(PackTwist<double>& twist, int lanes, int lane, const Chain& chain
         return;
     const ChainTwist& own = chain.twist;
     const size_t segments = chain.segments.size();
-    if (!twist.isPresent()) {
-        for (auto* values : {&twist.stiffness, &twist.rest, &twist.angularVelocity, &twist.torque})
-            values->assign((segments+1)*lanes, 0.0);
-        // What fills up does not turn.
-        twist.friction.assign(segments*lanes, 1e100);
-        twist.frameFriction.assign((segments+1)*lanes, 1e100);
-        twist.directions.assign(6*lanes, 0.0);
-    }
+    if (!twist.isPresent())
+        twist = PackTwist<double>(segments, lanes);
     for (size_t s = 0; s < segments; s++)
         twist.friction[s*lanes+lane] = own.friction[s];
     for (size_t joint = 0; joint < own.stiffness.size(); joint++) {
@@ -78,20 +72,20 @@ void fillTwist(PackTwist<double>& twist, int lanes, int lane, const Chain& chain
         twist.stiffness[node*lanes+lane] = own.stiffness[joint];
         twist.rest[node*lanes+lane] = own.rest[joint];
     }
-    twist.isHeld |= chain.closed || (own.ends[0].stiffness > 0 && own.ends[1].stiffness > 0);
+    const bool isHeld = chain.closed || (own.ends[0].stiffness > 0 && own.ends[1].stiffness > 0);
+    twist.held[lane] = isHeld;
+    twist.isHeld |= isHeld;
     for (int end = 0; end < 2 && !chain.closed; end++) {
         const EndFrame& frame = own.ends[end];
-        const size_t place = (end == 0 ? 0 : segments)*lanes+lane;
         const double sign = end == 0 ? -1 : 1;
-        twist.stiffness[place] = frame.stiffness;
+        twist.stiffness[(end == 0 ? 0 : segments)*lanes+lane] = frame.stiffness;
         if (frame.friction > 0) {
-            twist.frameFriction[place] = frame.friction;
-            twist.angularVelocity[place] = sign*frame.torque/frame.friction;
-            twist.hasTurningFrames = true;
+            twist.frameMobility[end*lanes+lane] = 1/frame.friction;
+            twist.angularVelocity[end*lanes+lane] = sign*frame.torque/frame.friction;
         }
         else {
-            twist.angularVelocity[place] = sign*frame.angularVelocity;
-            twist.torque[place] = sign*frame.torque;
+            twist.angularVelocity[end*lanes+lane] = sign*frame.angularVelocity;
+            twist.torque[end*lanes+lane] = sign*frame.torque;
         }
         for (int k = 0; k < 3; k++)
             twist.directions[(3*end+k)*lanes+lane] = frame.direction[k];

@@ -16,10 +16,9 @@ public:
         const int n = pack.nodes;
         Vec* f = vectors.reserve<Vec>(4*n);
         y = f+n;
-        turned = twists.reserve<Real>(2*numTwists(pack));
-        start = {y+n, y+2*n, tethers.reserve<TetherVector>(pack.tethers.size()), turned+numTwists(pack)};
-        gatherStepStart<W>(pack, positions, box, settings.flow.present, start);
-        gatherTwists<W>(pack, settings, start.twists);
+        start = {y+n, y+2*n, tethers.reserve<TetherVector>(pack.tethers.size())};
+        gatherStepStart<W>(pack, positions, box, settings, twists, start);
+        turned = twists.reserveChanges<W>(pack);
         gatherForces<W>(pack, forces, f);
         for (int i = 0; i < W; i++)
             lane(active, i) = taken[i] ? 1 : 0;
@@ -115,9 +114,10 @@ public:
 private:
     const Pack& pack;
     StepSettings settings;
-    Scratch vectors, tethers, twists;
+    Scratch vectors, tethers;
+    TwistMemory twists;
     StepStart<W> start;
-    Real* turned;
+    typename DoubleLanes<W>::Type* turned;
     /** A vector of a node in a lane, and a fourth number that is not used. */
     typedef FourOf<Scalar> Record;
     Vec *y, *forcesOnNodes, *movesOfNodes;

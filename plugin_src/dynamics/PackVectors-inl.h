@@ -86,9 +86,9 @@ template <int W> void gatherStart(const Pack& pack, const double* positions, con
             x[node].z = x[0].z;
 }
 
-/** Bring the vectors of segments into lanes: differences of doubles, however far from the origin they are. */
-template <int W> void gatherSegments(const Pack& pack, const double* positions, const double* box,
-            Vector<typename Lanes<W>::Type>* result) {
+/** Call a function with the vector of each segment and lane: differences of doubles, however far from the origin. */
+template <int W, class Function> CYLCHAIN_INLINE void forSegments(const Pack& pack, const double* positions,
+            const double* box, Function function) {
     forPlacesOfLanes<W>(pack.nodes-1, [&] (int s, int i) {
         const int first = pack.particles[s*W+i], second = pack.particles[(s+1)*W+i];
         double d[] = {1, 0, 0};
@@ -100,6 +100,14 @@ template <int W> void gatherSegments(const Pack& pack, const double* positions, 
             if (pack.planar)
                 d[2] = 0;
         }
+        function(s, i, d);
+    });
+}
+
+/** Bring the vectors of segments into lanes. */
+template <int W> void gatherSegments(const Pack& pack, const double* positions, const double* box,
+            Vector<typename Lanes<W>::Type>* result) {
+    forSegments<W>(pack, positions, box, [&] (int s, int i, const double* d) {
         lane(result[s].x, i) = d[0];
         lane(result[s].y, i) = d[1];
         lane(result[s].z, i) = d[2];

@@ -14,6 +14,8 @@ namespace {
  * lengths, k l0^2/k_B T.
  */
 const double LARGEST_STRETCHING = 1e9;
+/** The same for the stiffness of twist over k_B T, times the root of one and how far a segment may turn in a step. */
+const double LARGEST_TWISTING = 1e5;
 /** The same for the step over the relaxation time of the sharpest bends, 4 h kappa/gamma_rot or 16 h kappa/xi. */
 double largestBendingRate(BendKind kind) {
     switch (kind) {
@@ -68,6 +70,19 @@ ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>
         copyTo(wide.turning, pack->turning);
         copyTo(wide.nodeFriction, pack->nodeFriction);
         copyTo(wide.rootNodeFriction, pack->rootNodeFriction);
+        if (pack->twist.isPresent()) {
+            if (!wide.twist.isPresent())
+                wide.twist = PackTwist<float>(wide.segments, lanes);
+            copyTo(wide.twist.stiffness, pack->twist.stiffness);
+            copyTo(wide.twist.torque, pack->twist.torque);
+            copyTo(wide.twist.rest, pack->twist.rest);
+            copyTo(wide.twist.angularVelocity, pack->twist.angularVelocity);
+            copyTo(wide.twist.frameMobility, pack->twist.frameMobility);
+            copyTo(wide.twist.friction, pack->twist.friction);
+            copyTo(wide.twist.directions, pack->twist.directions);
+            copyTo(wide.twist.held, pack->twist.held);
+            wide.twist.isHeld |= pack->twist.isHeld;
+        }
         if (!pack->propulsions.empty())
             wide.propulsions.resize((size_t) (wide.nodes-1)*lanes);
         copyTo(wide.propulsions, pack->propulsions);
@@ -100,9 +115,13 @@ bool WidePack::isUsed(const StepSettings& settings) const {
     if (settings.precision == Precision::Automatic && 2*chains <= bestKernels().wide.lanes)
         return false;
     const double h = settings.stepSize;
+    // What hands on the helix do to turns may be too stiff.
+    if (twisting > 0 && settings.turnedPairs != NULL)
+        return false;
     // A flow needs to know where chains are. Written so that NaN is not right.
     return settings.precision != Precision::Double && isImplicit(settings.scheme) && !settings.flow.present &&
             settings.kT > 0 && stretching <= LARGEST_STRETCHING*settings.kT &&
+            twisting*sqrt(1+2*settings.kT*h/leastAxialFriction) <= LARGEST_TWISTING*settings.kT &&
             h*bendingRate <= 1 && leastFriction >= LEAST_RESISTANCE*h &&
             largestFriction+h*bending <= LARGEST_RESISTANCE*h &&
             2*settings.kT*h >= LEAST_CHANGE*LEAST_CHANGE*lengthFriction;
@@ -129,6 +148,12 @@ void WidePack::include(const Chain& chain) {
         bendingRate = max(bendingRate, 4*stiffness/friction/largestBendingRate(kind));
         bending = max(bending, 4*stiffness/(length*length));
     }
+    for (double friction : chain.twist.friction)
+        leastAxialFriction = min(leastAxialFriction, friction);
+    for (double stiffness : chain.twist.stiffness)
+        twisting = max(twisting, stiffness);
+    for (const EndFrame& frame : chain.twist.ends)
+        twisting = max(twisting, frame.stiffness);
     for (const Tether& tether : chain.tethers)
         bending = max(bending, tether.stiffness);
 }

@@ -28,6 +28,8 @@ private:
      * of the latter.
      */
     double stretching = 0, bendingRate = 0, bending = 0, largestFriction = 0, leastFriction = HUGE_VAL;
+    /** The largest stiffness of twist, and the least friction of segments against turning about themselves. */
+    double twisting = 0, leastAxialFriction = HUGE_VAL;
     /** The largest friction against a change of a length, times its square. */
     double lengthFriction = 0;
     void include(const Chain& chain);

@@ -211,6 +211,7 @@ void drawFeneCoordinatesOf(const NoiseKey& key, const std::uint32_t* chains, con
 #define CYLCHAIN_INSTANTIATE_NORMALS(W, PAIRS) \
     template void drawNormals<W, PAIRS>(const NoiseKey&, NoiseKind, const NoisePlaces<W>&, Lanes<W>::Type*);
 #define CYLCHAIN_INSTANTIATE_NOISE(W) \
+    CYLCHAIN_INSTANTIATE_NORMALS(W, 1) \
     CYLCHAIN_INSTANTIATE_NORMALS(W, 2) \
     CYLCHAIN_INSTANTIATE_NORMALS(W, 3) \
     CYLCHAIN_INSTANTIATE_NORMALS(W, 4) \

@@ -29,10 +29,22 @@ template <> struct Lanes<1> {
     typedef Word Bits;
 };
 
-template <class Real> constexpr int LANE_COUNT = sizeof(Real)/sizeof(Scalar); // NOLINT(bugprone-sizeof-expression)
+/** The number in each lane. */
+template <class Real> struct OfLane {
+    typedef std::remove_reference_t<decltype(Real{}[0])> Type;
+};
+template <> struct OfLane<float> {
+    typedef float Type;
+};
+template <> struct OfLane<double> {
+    typedef double Type;
+};
+template <class Real> using NumberOf = typename OfLane<Real>::Type;
 
-template <class Real> CYLCHAIN_INLINE Scalar& lane(Real& value, int i) {
-    return reinterpret_cast<Scalar*>(&value)[i];
+template <class Real> constexpr int LANE_COUNT = sizeof(Real)/sizeof(NumberOf<Real>);
+
+template <class Real> CYLCHAIN_INLINE NumberOf<Real>& lane(Real& value, int i) {
+    return reinterpret_cast<NumberOf<Real>*>(&value)[i];
 }
 
 template <class Real> CYLCHAIN_INLINE Real root(Real value) {
@@ -43,7 +55,7 @@ template <class Real> CYLCHAIN_INLINE Real root(Real value) {
 }
 
 /** A number in all lanes. */
-template <class Real> CYLCHAIN_INLINE Real splat(Scalar value) {
+template <class Real> CYLCHAIN_INLINE Real splat(NumberOf<Real> value) {
     return value-Real{};
 }
 
@@ -97,7 +109,8 @@ private:
     std::size_t size = 0;
 };
 
-template <class Real> CYLCHAIN_INLINE Real loaded(const std::vector<Scalar>& values, std::size_t index) {
+template <class Real, class Number> CYLCHAIN_INLINE Real loaded(const std::vector<Number>& values,
+            std::size_t index) {
     Real result;
     for (int i = 0; i < LANE_COUNT<Real>; i++)
         lane(result, i) = values[index*LANE_COUNT<Real>+i];

@@ -4,9 +4,11 @@
  */
 
 #include "TestChains.h"
+#include "dynamics/PackStep.h"
 #include "lanes/Noise.h"
 #include <algorithm>
 #include <functional>
+#include <memory>
 #include <thread>
 
 static const double KT = 2.5;
@@ -133,6 +135,140 @@ static void testStepsAreThoseOfDoublePrecision() {
             flat[i] = 3;
         checkSteps("chains in a plane", planar, flat);
     }
+}
+
+/** Twist with frames at no end, at one or at both, of which one may have a torque or be turned. */
+static vector<Chain> twisted(vector<Chain> chains) {
+    for (size_t i = 0; i < chains.size(); i++) {
+        ChainTwist& twist = chains[i].twist;
+        for (size_t s = 0; s < chains[i].segments.size(); s++)
+            twist.friction.push_back(4+0.1*s);
+        for (size_t joint = 0; joint < chains[i].joints.size(); joint++) {
+            twist.stiffness.push_back(60+joint);
+            twist.rest.push_back(0.1*joint);
+        }
+        for (int end = 0; end < 2; end++)
+            if (i%4 > 0 && (end == 1 || i%4 > 1))
+                twist.ends[end] = {{0.6, 0.48, 0.64}, i%4 == 2 && end == 1 ? 0.0 : 120.0,
+                        i%4 == 2 && end == 1 ? 3.0 : 0.0, i%4 == 3 && end == 1 ? 0.2 : 0.0};
+    }
+    return chains;
+}
+
+/** Some twists for the joints of chains, and those of its end frames. */
+static vector<Array> someTwists(const vector<Chain>& chains) {
+    vector<Array> twists;
+    for (const Chain& chain : chains) {
+        twists.emplace_back(chain.numTwists());
+        for (size_t joint = 0; joint < twists.back().size(); joint++)
+            twists.back()[joint] = 0.3*sin(7*joint+twists.size());
+    }
+    return twists;
+}
+
+static Array tangentOf(const Chain& chain, const Array& x, int s) {
+    Array tangent(3);
+    double square = 0;
+    for (int k = 0; k < 3; k++) {
+        tangent[k] = x[3*chain.nodes[s+1]+k]-x[3*chain.nodes[s]+k];
+        square += tangent[k]*tangent[k];
+    }
+    for (double& component : tangent)
+        component /= sqrt(square);
+    return tangent;
+}
+
+/** The area of a spherical triangle. */
+static double triangle(const Array& a, const Array& b, const Array& c) {
+    auto dot = [] (const Array& u, const Array& v) {return u[0]*v[0]+u[1]*v[1]+u[2]*v[2];};
+    const double volume = a[0]*(b[1]*c[2]-b[2]*c[1])+a[1]*(b[2]*c[0]-b[0]*c[2])+a[2]*(b[0]*c[1]-b[1]*c[0]);
+    return 2*atan2(volume, 1+dot(a, b)+dot(b, c)+dot(c, a));
+}
+
+/** What the ribbon of tangents between both frames of a chain has swept on the unit sphere. */
+static double sweptBy(const Chain& chain, const Array& x, const Array& y) {
+    const EndFrame* const ends = chain.twist.ends;
+    const Array first(ends[0].direction, ends[0].direction+3), last(ends[1].direction, ends[1].direction+3);
+    const int segments = chain.segments.size();
+    double area = 0;
+    for (int s = 0; s <= segments; s++) {
+        const Array a = s > 0 ? tangentOf(chain, x, s-1) : first, b = s < segments ? tangentOf(chain, x, s) : last;
+        const Array newA = s > 0 ? tangentOf(chain, y, s-1) : first;
+        const Array newB = s < segments ? tangentOf(chain, y, s) : last;
+        area += triangle(a, b, newB)+triangle(a, newB, newA);
+    }
+    return area;
+}
+
+/** The torques between both frames of a chain turn nothing else: its linking number stays what it was. */
+static void checkLinkingNumbers(const vector<Chain>& chains, const Array& start, const Array& displacements,
+            const vector<Array>& changes, double h) {
+    Array end = start;
+    for (size_t i = 0; i < end.size(); i++)
+        end[i] += displacements[i];
+    for (size_t i = 0; i < chains.size(); i++) {
+        if (i%4 < 2)
+            continue;
+        // Turns cancel, and so does what the areas of parts of a divided step differ by from that of the whole.
+        double sum = -chains[i].twist.ends[1].angularVelocity*h-sweptBy(chains[i], start, end);
+        for (double change : changes[i])
+            sum += change;
+        checkClose(0, remainder(sum, 4*M_PI), 1, 1e-12, "linking number of a chain");
+    }
+}
+
+/** Take a step as those of chains that are coupled are taken. */
+static Array coupledStep(const ChainEngine& engine, const Array& x, const Array& f, StepSettings settings) {
+    settings.precision = Precision::Mixed;
+    Array displacements(x.size());
+    for (int pack : engine.getPacksOfStep(settings)) {
+        const unique_ptr<PackStep> step = engine.createStep(pack);
+        const int lanes = engine.getChainsOfLanes(pack).size();
+        unique_ptr<bool[]> taken(new bool[lanes]), unfinished(new bool[lanes]);
+        fill_n(taken.get(), lanes, true);
+        step->begin(x.data(), f.data(), NULL, settings, taken.get());
+        step->beginStage(0);
+        do {
+            step->eliminate(NULL, 0, NULL);
+            step->advance(NULL, {}, unfinished.get(), NULL);
+        } while (any_of(unfinished.get(), unfinished.get()+lanes, [] (bool one) {return one;}));
+        step->getDisplacements(displacements.data());
+    }
+    return displacements;
+}
+
+static void testTwist() {
+    Array x;
+    const vector<Chain> chains = twisted(makeChains(LENGTHS, BendingModel::KratkyPorod, StretchingModel::Harmonic, x));
+    const ChainEngine engine(chains);
+    const Array f = someForces(x);
+    vector<Array> twists = someTwists(chains), changes[] = {twists, twists};
+    Array differences;
+    int divided = 0;
+    for (double h : {1e-3, 0.03, 0.5, 3.0})
+        for (uint64_t number = 0; number < 10; number++) {
+            StepSettings settings = settingsFor(Scheme::Implicit, h, number);
+            settings.twists = &twists;
+            check(mixedChains(Precision::Mixed, engine, settings) == (int) chains.size(), "twist in mixed precision");
+            // Between two frames, one is so bent that its steps are divided.
+            Array start = x;
+            if (number > 7)
+                start[3*chains[11].nodes[4]+2] += 30;
+            settings.twistChanges = &changes[0];
+            stepIn(Precision::Double, engine, start, f, settings);
+            settings.twistChanges = &changes[1];
+            const StepResult found = stepIn(Precision::Mixed, engine, start, f, settings);
+            divided += found.divided;
+            for (size_t i = 0; i < chains.size(); i++)
+                differences.push_back(relativeDifference(changes[0][i], changes[1][i]));
+            checkLinkingNumbers(chains, start, found.displacements, changes[1], h);
+            if (h > 0.1)
+                continue;
+            checkLinkingNumbers(chains, x, coupledStep(engine, x, f, settings), changes[1], h);
+        }
+    check(divided > 0, "divided steps of chains with twist");
+    check(sorted(differences, 0.5) < 1e-5, "twists of most chains");
+    check(sorted(differences, 0.95) < 1e-3, "twists of nearly all chains");
 }
 
 static void testNoise() {
@@ -426,6 +562,61 @@ static void testEnergies() {
     checkEnergies(9.9e8, 1000, 9.9e3, Scheme::ImplicitSecondOrder, 6);
 }
 
+static void testEnergiesOfTwist() {
+    // On one path, with free ends and between frames that share four turns.
+    const Material material(1e5, 10);
+    const double h = 10*material.segment.rotational/(4*material.joint), stiffness = 20*KT;
+    const int count = 64, segments = 12, steps = 300, first = 50;
+    double energies[2][3] = {};
+    for (Precision precision : {Precision::Double, Precision::Mixed}) {
+        Array x;
+        vector<Chain> chains = material.chains(count, segments, x);
+        vector<Array> twists, changes;
+        for (int i = 0; i < count; i++) {
+            Chain& chain = chains[i];
+            chain.twist.friction.assign(segments, 0.05*h*stiffness);
+            chain.twist.stiffness.assign(segments-1, stiffness);
+            chain.twist.rest.assign(segments-1, 1);
+            if (i%2 == 1) {
+                chain.fixed[0] = chain.fixed[1] = true;
+                for (EndFrame& frame : chain.twist.ends)
+                    frame = {{1, 0, 0}, 2*stiffness, 0, 0};
+            }
+            twists.emplace_back(segments+1, i%2 == 1 ? 1+4*M_PI/segments : 1);
+            twists.back().front() = twists.back().back() = i%2 == 1 ? 2*M_PI/segments : 0;
+        }
+        changes = twists;
+        const ChainEngine engine(chains);
+        StepSettings settings = settingsFor(Scheme::Implicit, h);
+        settings.twists = &twists;
+        settings.twistChanges = &changes;
+        Array f(x.size());
+        for (int i = 1; i < count; i += 2)
+            f[3*chains[i].nodes.back()] = 20*KT/100;
+        double* const sums = energies[precision == Precision::Mixed];
+        for (int step = 0; step < steps; step++) {
+            settings.step = step;
+            const int mixed = mixedChains(precision, engine, settings);
+            check(mixed == (precision == Precision::Mixed ? count : 0), "mixed chains");
+            const StepResult found = stepIn(precision, engine, x, f, settings);
+            for (size_t i = 0; i < x.size(); i++)
+                x[i] += found.displacements[i];
+            for (int i = 0; i < count; i++)
+                for (int joint = 0; joint <= segments; joint++) {
+                    twists[i][joint] += changes[i][joint];
+                    const bool isInner = joint > 0 && joint < segments;
+                    const double energy = isInner ? 0.5*stiffness*pow(twists[i][joint]-1, 2)/(steps-first) : 0;
+                    sums[i%2] += step < first ? 0 : energy;
+                    sums[2] += step < first ? 0 : (i%2)*twists[i][joint]/(steps-first);
+                }
+        }
+    }
+    // There are 32 free chains, each of whose joints has half of k_B T.
+    checkClose(0.5*KT*32*(segments-1), energies[0][0], energies[0][0], 0.05, "energy of twist");
+    for (int kind = 0; kind < 3; kind++)
+        checkClose(1, energies[1][kind]/energies[0][kind], 1, 5e-4, "energies of twist in mixed precision");
+}
+
 static void testDiffusionOfRods() {
     const Material material(5e8, 1);
     Array x;
@@ -567,6 +758,21 @@ static void testWhereSinglePrecisionWouldNotDo() {
     check(mixed([] (Chain& chain) {chain.segments[2].stiffness *= 1.01e4;}, usual) == 0, "a length that is too stiff");
     check(mixed([] (Chain& chain) {chain.joints[1] *= 1.01e3;}, usual) == 0, "one joint that is too stiff");
     check(mixed([] (Chain& chain) {chain.joints[1] *= 0.99e3;}, usual) == 20, "one joint that is nearly too stiff");
+    auto withTwist = [] (double stiffness) {
+        return [=] (Chain& chain) {
+            chain.twist.friction.assign(4, 2*KT*2e6/3);
+            chain.twist.stiffness.assign(3, stiffness*KT);
+            chain.twist.rest.assign(3, 0);
+        };
+    };
+    // With three square radians, which segments turn in the step, on top.
+    check(mixed(withTwist(0.99*5e4), usual) == 20, "twist that is nearly too stiff");
+    check(mixed(withTwist(1.01*5e4), usual) == 0, "twist that is too stiff");
+    changed = usual;
+    const vector<vector<TurnedPair> > pairs;
+    changed.turnedPairs = &pairs;
+    check(mixed(withTwist(100), changed) == 0, "hands on the helix");
+    check(mixed(asItIs, changed) == 20, "hands on the helix of others");
     check(mixed([] (Chain& chain) {
         chain.stretching = StretchingModel::FENE;
         for (Segment& segment : chain.segments)
@@ -595,6 +801,7 @@ static void testWhereSinglePrecisionIsFaster() {
 int main() {
     return runTests({
         testStepsAreThoseOfDoublePrecision,
+        testTwist,
         testNoise,
         testPlaceInSpaceDoesNotMatter,
         testChainsDoNotDependOnTheirPack,
@@ -602,6 +809,7 @@ int main() {
         testDividedSteps,
         testForcesOfSegments,
         testEnergies,
+        testEnergiesOfTwist,
         testDiffusionOfRods,
         testLengthsBeginToFluctuateInShortSteps,
         testWhereSinglePrecisionWouldNotDo,

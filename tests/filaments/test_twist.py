@@ -46,7 +46,9 @@ END = 4.0 * KT
 NANOSECOND = 1e3
 
 
-def in_context(filaments, step, pull=None, seed=1, platform="CPU", contacts=False, level=0, force=None):
+def in_context(
+    filaments, step, pull=None, seed=1, platform="CPU", contacts=False, level=0, force=None, precision="automatic"
+):
     """A Context of filaments, which constant forces pull along z, and a FilamentsInContext.
 
     Stronger ones hold the last segment along z, where a frame may be. The level is that of the Brownian path.
@@ -63,7 +65,7 @@ def in_context(filaments, step, pull=None, seed=1, platform="CPU", contacts=Fals
         system.addForce(force)
     if contacts:
         system.addForce(capsule_contact_force(filaments, system, 2.0))
-    integrator = filaments.create_integrator(system, step, random_seed=seed, checks=False)
+    integrator = filaments.create_integrator(system, step, random_seed=seed, checks=False, precision=precision)
     integrator.setPathLevel(level)
     context = new_context(system, positions, integrator, platform)
     return context, filaments.in_context(context)
@@ -367,14 +369,16 @@ def test_linking_number_of_rings_is_followed(contacts):
             assert turns == pytest.approx(0.5 * number, abs=1e-10)
 
 
-def test_linking_number_of_a_held_chain_is_followed():
+@pytest.mark.parametrize(("precision", "contacts"), [("double", False), ("mixed", False), ("mixed", True)])
+def test_linking_number_of_a_held_chain_is_followed(precision, contacts):
     """With its ends joined far away, by a polygon in a plane beside them."""
     filaments = held_chains(1, 16)
-    context, own = in_context(filaments, 100 * NANOSECOND, pull=2 * KT)
+    context, own = in_context(filaments, 100 * NANOSECOND, pull=2 * KT, contacts=contacts, precision=precision)
     own.turn_end(0, "plus", 2 * np.pi)
     turns = []
     for _ in range(40):
-        context.getIntegrator().step(3)
+        context.getIntegrator().step(250 if precision == "mixed" else 3)
+        assert context.getIntegrator().getNumMixedPrecisionChains() == (precision == "mixed")
         nodes = positions_of(context)
         first, last = nodes[0], nodes[-1]
         far = 1e6
@@ -450,15 +454,16 @@ def test_ring_without_noise_stays_at_its_intrinsic_twist():
 # Equilibrium
 
 
-@pytest.mark.parametrize("step", [1e2, 1e3, 1e4])
-def test_twist_of_free_chains(step):
+@pytest.mark.parametrize(("step", "precision"), [(1e2, "mixed"), (1e3, "mixed"), (1e4, "mixed"), (1e4, "double")])
+def test_twist_of_free_chains(step, precision):
     """k_B T l0/C in each joint, independent of each other, at any step; bends are those of chains without."""
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     for number in range(48):
         filaments.add_equilibrium(DNA, 8, number)
-    context, own = in_context(filaments, step)
+    context, own = in_context(filaments, step, precision=precision)
     variances, products, bends = [], [], []
     context.getIntegrator().step(int(max(20, 4e4 / step)))
+    assert context.getIntegrator().getNumMixedPrecisionChains() == (48 if precision == "mixed" else 0)
     for _ in range(400):
         context.getIntegrator().step(int(max(2, 6e3 / step)))
         twists = np.array([own.twists(number)._value[1:-1] for number in range(48)])
@@ -584,9 +589,9 @@ def test_writhe_in_the_recommended_step():
 def test_torque_of_chains_held_in_turns_is_that_of_the_closed_form():
     """C_eff, at a step that is a hundred times longer than another, and from the writhe of nearly straight chains."""
     turn, torques = 20.0, []
-    for step in (1e4, 1e6):
+    for step, precision in ((1e4, "mixed"), (1e6, "mixed"), (1e6, "double")):
         filaments = held_chains(16, 64)
-        context, own = in_context(filaments, step, pull=4 * KT)
+        context, own = in_context(filaments, step, pull=4 * KT, precision=precision)
         for number in range(16):
             own.set_twists(number, turn / 64 * np.array([0.5, *[1] * 63, 0.5]))
         context.getIntegrator().step(int(max(200, 1e8 / step)))
@@ -601,6 +606,8 @@ def test_torque_of_chains_held_in_turns_is_that_of_the_closed_form():
         assert error < 0.002 * exact
         assert mean == pytest.approx(exact, rel=0.01)
     assert torques[0][0] == pytest.approx(torques[1][0], abs=SIGMAS * np.hypot(torques[0][1], torques[1][1]) + 0.002)
+    # On one path.
+    assert torques[1] == pytest.approx(torques[2], rel=1e-3)
 
 
 # Of 100 nm, so that they relax soon, and with so much twist that it divides the mean of Wr^2 by 2.5.

@@ -79,15 +79,16 @@ public:
      */
     enum Scheme : int {CYLCHAIN_SCHEMES(CYLCHAIN_ENUMERATOR)};
     /**
-     * The precision that steps of chains are computed in.  Positions, forces and energies are in double precision in
-     * any case.
+     * The precision that steps of chains are computed in.  Positions, twists, forces and energies are in double
+     * precision in any case.
      *
      * Automatic: mixed, where it is right and faster: for open chains with harmonic lengths and a scheme that is
      * implicit, at a temperature above zero, without a flow, with bends that relax within a step by less than 10^4 of
-     * their relaxation time, lengths of at most 10^9 kT that noise changes by 10^-5 in a step or more, if there are
-     * enough such chains to fill more than half of a vector register, or chains so long that pieces of them do.  For
-     * the scheme Modes: at a temperature above zero and with a stiffness of bonds and bends of at most 10^9 kT.  It is
-     * the default.
+     * their relaxation time, lengths of at most 10^9 kT that noise changes by 10^-5 in a step or more, and twist of
+     * at most 10^5 kT over how far a segment turns in a step, on which no hands follow a helix, if there are enough
+     * such chains to fill more than half of a vector register, or chains so long that pieces of them do.  For the
+     * scheme Modes: at a temperature above zero and with a stiffness of bonds and bends of at most 10^9 kT.  It is the
+     * default.
      *
      * Mixed: what happens within a step is computed in single precision wherever that is right, for as few chains as
      * there are.  Chains for which it is not right are computed in double precision.
