@@ -15,6 +15,7 @@ from openmm_cylchain import (
     Filaments,
     FilamentType,
     InputError,
+    InstabilityError,
     TwistWarning,
     analysis,
     capsule_contact_force,
@@ -297,6 +298,17 @@ def test_chains_of_other_lengths_share_lanes():
     for number, (nodes, twists) in enumerate(together):
         alone = after_steps(np.where(np.arange(5) == number, lengths, 4))[number]
         assert nodes == pytest.approx(alone[0], abs=1e-9) and twists == pytest.approx(alone[1], abs=1e-9)
+
+
+def test_segments_that_torque_has_folded_are_told_of():
+    for kind, told in ((DNA, True), (UNTWISTED, False)):
+        filaments = Filaments(VISCOSITY, TEMPERATURE)
+        filaments.add_straight(kind, 4, [0, 0, 0], [0, 0, 1])
+        context, _ = in_context(filaments, NANOSECOND)
+        context.setPositions(positions_of(context)[[0, 1, 2, 1, 2]] * [1, 1, 1e3])
+        with pytest.raises(InstabilityError, match="has blown up") as raised:
+            context.getIntegrator().step(1)
+        assert ("use shorter segments, or less torque" in str(raised.value)) == told
 
 
 @pytest.mark.parametrize(("share", "warned"), [(0.98, False), (1.02, True)])
