@@ -22,7 +22,7 @@ def advice_after_blow_up(system, filaments):
     if any(has_twist(filament.type) for filament in filaments):
         advice += (
             " Where torque has folded two segments with twist onto each other, a smaller step does not help: use "
-            "shorter segments, or less torque."
+            "shorter segments, contacts with fewer excluded_neighbors, or less torque."
         )
     if not is_periodic(system):
         return advice

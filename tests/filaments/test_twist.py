@@ -308,7 +308,7 @@ def test_segments_that_torque_has_folded_are_told_of():
         context.setPositions(positions_of(context)[[0, 1, 2, 1, 2]] * [1, 1, 1e3])
         with pytest.raises(InstabilityError, match="has blown up") as raised:
             context.getIntegrator().step(1)
-        assert ("use shorter segments, or less torque" in str(raised.value)) == told
+        assert ("fewer excluded_neighbors, or less torque" in str(raised.value)) == told
 
 
 @pytest.mark.parametrize(("share", "warned"), [(0.98, False), (1.02, True)])
