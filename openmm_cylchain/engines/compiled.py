@@ -140,7 +140,7 @@ class CompiledEngine(Engine):
             settings.random_seed,
             len(placed.filaments) + len(placed.bodies),
             settings.flow,
-            advice_after_blow_up(system),
+            advice_after_blow_up(system, placed.filaments),
             settings.checks,
             settings.precision,
         )

@@ -5,18 +5,24 @@ import numpy as np
 from ..couplings.growing_chains import growing_particles
 from ..couplings.periodicity import is_periodic
 from ..errors import InputError
+from ..filaments.twist import has_twist
 from ..mechanics.friction import SegmentFriction
 from ..mechanics.redistribution import ChainSet
 
 
-def advice_after_blow_up(system):
+def advice_after_blow_up(system, filaments):
     """What else to say of a chain that has blown up: its positions may be those of another length, or may have been
-    torn in a periodic System by wrapping."""
+    torn in a periodic System by wrapping; torque may have folded it."""
     advice = ""
     if growing_particles(system):
         advice = (
             " Positions of filaments that grow are those of a length: set them with it, by a checkpoint or by a State "
             "with integratorParameters=True."
+        )
+    if any(has_twist(filament.type) for filament in filaments):
+        advice += (
+            " Where torque has folded two segments with twist onto each other, a smaller step does not help: use "
+            "shorter segments, contacts with fewer excluded_neighbors, or less torque."
         )
     if not is_periodic(system):
         return advice

@@ -61,7 +61,7 @@ class PortableEngine(Engine):
             *describe_lengths(filaments),
             [filament_label(number, filament) for number, filament in enumerate(filaments)],
             *describe_other_particles(system, placed.nodes, settings.particle_friction),
-            advice_after_blow_up(system),
+            advice_after_blow_up(system, filaments),
             is_periodic(system),
         )
         return PortableIntegrator(

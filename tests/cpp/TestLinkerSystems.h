@@ -87,7 +87,8 @@ struct Mean {
         blocks.push_back(sum/count);
         sum = count = 0;
     }
-    void check(const string& what, double expected) const {
+    /** Within four standard errors, which must be below the share ``power`` of what is expected. */
+    void check(const string& what, double expected, double power=0.05) const {
         double mean = 0, square = 0;
         for (double value : blocks)
             mean += value/blocks.size();
@@ -95,7 +96,7 @@ struct Mean {
             square += (value-mean)*(value-mean);
         const double error = sqrt(square/(blocks.size()*(blocks.size()-1.0)));
         // Written so that NaN fails.
-        if (!(4*error < 0.05*fabs(expected) && fabs(mean-expected) < 4*error))
+        if (!(4*error < power*fabs(expected) && fabs(mean-expected) < 4*error))
             throw runtime_error(what+": found "+to_string(mean)+" +- "+to_string(error)+", expected "+
                     to_string(expected));
     }

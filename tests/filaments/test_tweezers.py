@@ -18,17 +18,17 @@ from support.tweezers_monte_carlo import TweezedChain, TweezersMonteCarlo
 KIND = FilamentType(
     name="DNA",
     diameter=2.0,
-    segment_length=5.0,
+    segment_length=10.0,
     bending_rigidity=50.0 * KT,
     torsional_rigidity=100.0 * KT,
     stretching_modulus=4000.0 * KT,
     bending_model="kratky-porod",
 )
-# 250 nm between straight ends of 50 nm, under 0.5 pN: before and beyond the transition, at which loops begin.
+# 160 nm between straight ends of 50 nm, under 0.5 pN: before and beyond the transition, at which loops begin.
 STRAIGHT = TweezedChain(
-    70, 5.0, 10.0, 800.0, 6.0, 80 / 6.0**2, 3, twist=20.0, turns=1.0, handle=10, pull=0.12, aligning=4.0
+    26, 10.0, 5.0, 400.0, 6.0, 80 / 6.0**2, 2, twist=10.0, turns=1.0, handle=5, pull=0.12, aligning=4.0
 )
-PLECTONEME = replace(STRAIGHT, turns=3.0)
+PLECTONEME = replace(STRAIGHT, turns=2.0)
 NAMES = ("writhe", "z of the last node", "energy of contacts", "bends")
 SPACING = 1000.0
 
@@ -40,8 +40,9 @@ class TweezersSimulation:
         self.chain, copies = chain, len(nodes)
         self._origins = SPACING * np.column_stack([np.arange(copies), np.zeros((copies, 2))])
         filaments = Filaments(0.69e-3 * unit.pascal * unit.second, TEMPERATURE)
+        kind = KIND.with_segment_length(chain.length)
         for number, origin in enumerate(self._origins):
-            filaments.add_straight(KIND, chain.segments, origin, [0, 0, 1], clamped=range(chain.handle + 1))
+            filaments.add_straight(kind, chain.segments, origin, [0, 0, 1], clamped=range(chain.handle + 1))
             for end in ("minus", "plus"):
                 filaments.add_end_frame(number, end, [0, 0, 1])
         _, self.system, _ = filaments.build()
@@ -51,7 +52,7 @@ class TweezersSimulation:
             pull.addParticle(int(own[-1]), [(chain.pull + chain.aligning) * KT])
             pull.addParticle(int(own[-1 - chain.handle]), [-chain.aligning * KT])
         self.system.addForce(pull)
-        contacts = capsule_contact_force(filaments, self.system, chain.diameter)
+        contacts = capsule_contact_force(filaments, self.system, chain.diameter, excluded_neighbors=chain.excluded)
         contacts.setForceGroup(1)
         self.system.addForce(contacts)
         self.integrator = filaments.create_integrator(self.system, step, random_seed=seed, checks=False)
@@ -79,7 +80,7 @@ class TweezersSimulation:
 def test_energies_are_those_of_monte_carlo():
     """Of chains that are wound up in coils which touch each other."""
     generator = np.random.default_rng(1)
-    chain, nodes = PLECTONEME, PLECTONEME.coiled(4, 5.0, height=28.0)
+    chain, nodes = PLECTONEME, PLECTONEME.coiled(4, 3.0, height=17.0)
     nodes[:, chain.handle + 1 :] += generator.normal(0.0, 1.0, (4, chain.segments - chain.handle, 3))
     rows = chain.observe(nodes)
     assert (rows[:, 2] > 1).all()
@@ -89,52 +90,66 @@ def test_energies_are_those_of_monte_carlo():
 
 def test_moves_of_monte_carlo():
     """What is fixed stays, and so do turns and what energies are known to be."""
-    nodes = PLECTONEME.coiled(4, 2.0)
+    nodes = PLECTONEME.coiled(4, 1.0)
     sampler = TweezersMonteCarlo(PLECTONEME, nodes, 1, winding=1)
     sampler.sweep(40)
-    assert np.array_equal(sampler.nodes[:, :11], nodes[:, :11])
+    assert np.array_equal(sampler.nodes[:, :6], nodes[:, :6])
     assert (np.abs(sampler.nodes - nodes).max(axis=(1, 2)) > 1.0).all()
     assert sampler._energies == pytest.approx(sampler._energies_of(sampler.nodes))
     assert sampler._writhes == pytest.approx(PLECTONEME.writhes(sampler.nodes))
 
 
 # Means and standard errors of the observables of NAMES, by Metropolis walks of the same energies: the moves of
-# ``TweezersMonteCarlo`` in a compiled program, 2 million of them for the first and 12 for the other.
+# ``TweezersMonteCarlo`` in a compiled program, 12 million of them for the first and 130 for the other.
 REFERENCES = {
-    STRAIGHT: ([0.1607, 291.6, 0.0, 51.04], [0.0127, 2.4, 0.0, 0.52]),
-    PLECTONEME: ([1.7457, 188.9, 0.3457, 64.46], [0.0205, 2.3, 0.0098, 0.16]),
+    STRAIGHT: ([0.1174, 223.3, 0.0006, 14.80], [0.0053, 0.8, 0.0005, 0.14]),
+    PLECTONEME: ([1.0811, 159.30, 0.178, 24.563], [0.0042, 0.55, 0.002, 0.022]),
 }
-
-
-def assert_as_in_monte_carlo(chain, rows):
-    """Of the torque C (2 pi/L) (Lk - Wr), the share that writhe leaves."""
-    exact, exact_errors = np.array(REFERENCES[chain])
-    means, errors = rows.mean(axis=0), np.hypot(rows.std(axis=0, ddof=1) / np.sqrt(len(rows)), exact_errors)
-    means[0], exact[0] = chain.turns - means[0], chain.turns - exact[0]
-    measured = zip(NAMES, means, errors, exact)
-    lines = "\n".join(f"{name}: {mean:.5g} +- {error:.2g} of {value:.5g}" for name, mean, error, value in measured)
-    # What touches seldom cannot be told apart.
-    seen = [0, 1, 3]
-    assert (np.abs(means - exact) <= 0.05 * exact + 4 * errors)[seen].all(), lines
-    assert (4 * errors <= np.array([0.2, 0.12, 1.0, 0.06]) * exact)[seen].all(), lines
 
 
 @pytest.mark.slow
 @pytest.mark.sample("plectoneme")
-@pytest.mark.parametrize(("chain", "coils"), [(STRAIGHT, 0.0), (PLECTONEME, 2.0)], ids=["straight", "plectoneme"])
+@pytest.mark.parametrize(("chain", "coils"), [(STRAIGHT, 0.0), (PLECTONEME, 1.2)], ids=["straight", "plectoneme"])
 def test_extension_and_torque_are_those_of_monte_carlo(chain, coils):
-    """In steps of 40 times the recommended one.
+    """In six times the recommended step, so that a torque or a height that is off by 5 % fails.
 
-    Lk is kept, but for the polygon that closes far away, and for one chain or two that slip over an end, or through
-    segments that do not touch each other, which Monte Carlo refuses.
+    Lk is kept, but for the polygon that closes far away. Of the torque C (2 pi/L) (Lk - Wr) is compared what writhe
+    leaves.
     """
-    simulation = TweezersSimulation(chain, chain.coiled(32, coils), 2e4, 1)
-    simulation.integrator.step(round(2e8 / 2e4))
-    rows, samples = 0.0, 30
+    step, copies, samples = 1e4, 64, 58
+    simulation = TweezersSimulation(chain, chain.coiled(copies, coils, height=60.0), 50.0, 1)
+    # The turns of a helix fall apart first.
+    for settling, steps in ((50.0, 400), (500.0, 400), (step, 4000)):
+        simulation.integrator.setStepSize(settling)
+        simulation.integrator.step(steps)
+    rows = 0.0
     for _ in range(samples):
-        simulation.integrator.step(round(3e8 / samples / 2e4))
+        simulation.integrator.step(500)
         rows = rows + chain.observe(simulation.nodes()) / samples
-    lost = np.abs(simulation.turns() - chain.turns)
-    kept = lost < 1e-3
-    assert kept.sum() >= 29 and lost[~kept] == pytest.approx(2.0, abs=1e-3)
-    assert_as_in_monte_carlo(chain, rows[kept])
+    assert simulation.turns() == pytest.approx(np.full(copies, chain.turns), abs=1e-3)
+    exact, exact_errors = np.array(REFERENCES[chain])
+    means, errors = rows.mean(axis=0), np.hypot(rows.std(axis=0, ddof=1) / np.sqrt(copies), exact_errors)
+    means[0], exact[0] = chain.turns - means[0], chain.turns - exact[0]
+    measured = zip(NAMES, means, errors, exact)
+    lines = "\n".join(f"{name}: {mean:.5g} +- {error:.2g} of {value:.5g}" for name, mean, error, value in measured)
+    # What touches seldom cannot be told. Bends are 0.8 % smaller in long steps.
+    seen, allowed = [0, 1, 3], np.array([0.0, 0.0, 0.0, 0.01]) * exact
+    assert (np.abs(means - exact) <= allowed + 4 * errors)[seen].all(), lines
+    assert (4 * errors <= np.array([0.05, 0.05, 1.0, 0.05]) * exact)[seen].all(), lines
+
+
+@pytest.mark.slow
+def test_tight_plectonemes_keep_their_turns():
+    """Under 2 pN, where torque folds the joint at the tip: it opens again, as long as what lies beside it touches."""
+    lengths = {"segments": 46, "length": 5.0, "joint": 10.0, "stretching": 800.0, "twist": 20.0, "handle": 7}
+    chain = replace(PLECTONEME, turns=3.0, pull=0.48, **lengths)
+    simulation = TweezersSimulation(chain, chain.coiled(32, 1.5, height=100.0), 50.0, 1)
+    folded = 0
+    for step, steps, times in ((50.0, 400, 1), (500.0, 100, 100)):
+        simulation.integrator.setStepSize(step)
+        for _ in range(times):
+            simulation.integrator.step(steps)
+            tangents = np.diff(simulation.nodes(), axis=1) / chain.length
+            folded += ((tangents[:, 1:] * tangents[:, :-1]).sum(axis=2) < -0.5).sum()
+    assert simulation.turns() == pytest.approx(np.full(32, 3.0), abs=1e-3)
+    assert folded > 0

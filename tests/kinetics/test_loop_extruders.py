@@ -106,24 +106,30 @@ def test_pairs_and_barriers_in_a_context_that_starts_again():
             np.testing.assert_array_equal(places, ends[0][1])
 
 
-def way_of_hands(outer, tension, loops, stall, speed, time):
+def way_of_hands(outer, tension, loop, stiffness, stall, speed, time):
     """How far hands walk outward on a freely jointed chain under a tension, from places on their segments.
 
     The part a of a segment between a hand and the joint beyond it has the partition function sinh(x)/x under the
-    tension T, with x = T a/k_BT, so that it pulls with T (coth x - 1/x); a loop pulls with 3 k_BT/(2 s).
+    tension T, with x = T a/k_BT, so that it pulls with T c, c = coth x - 1/x. With the segment's other part i, n whole
+    ones b and the part of the other hand, the loop goes from hand to hand along the spring k, whose mean is T/k along
+    the tension. It pulls with k_BT (i (1 + c^2) - c T/k)/s, where s = n b^2/3 + k_BT/k is its variance in a direction.
     """
     way, parts = np.zeros_like(outer), 2000
     for _ in range(parts):
-        x = tension * np.maximum((outer - way) % SEGMENT, 1e-3) / KT
-        load = tension * (1.0 / np.tanh(x) - 1.0 / x) + 1.5 * KT / loops
+        part = (outer - way) % SEGMENT
+        x, inner = tension * np.maximum(part, 1e-3) / KT, SEGMENT - part
+        cosine = 1.0 / np.tanh(x) - 1.0 / x
+        of_loop = KT * (inner * (1.0 + cosine**2) - cosine * tension / stiffness)
+        load = tension * cosine + of_loop / (loop * SEGMENT**2 / 3.0 + KT / stiffness)
         way += speed * (1.0 - load / stall) * time / parts
     return way
 
 
 @pytest.mark.slow
 def test_loops_grow_against_the_tension_of_the_chain_and_stall():
-    stall, speed, step, count, loop = 2.0, 50.0, 2e7, 8, 12
-    for tension in (0.5, 1.5, 2.6):
+    """Within 3 % of their way, which a tension of 1.5 pN leaves a third of."""
+    stall, speed, step, loop, stiffness = 2.0, 50.0, 2e7, 12, 0.05
+    for tension, count in ((0.5, 8), (1.5, 48), (2.6, 8)):
         filaments = Filaments(viscosity=0.02 * unit.pascal * SECOND, temperature=300 * unit.kelvin)
         kind = chains(jointed=True)[0].type
         turn = 2 * np.pi * np.arange(1, loop + 1) / loop
@@ -134,7 +140,7 @@ def test_loops_grow_against_the_tension_of_the_chain_and_stall():
         for _ in range(count):
             number = filaments.add_nodes(kind, nodes)
             filaments.add_tether(number, 0, nodes[0], 100.0)
-        own = replace(extruder(speed, 0.0, 0.05, stall=stall, walks_backward=True), rest_length=0.0)
+        own = replace(extruder(speed, 0.0, stiffness, stall=stall, walks_backward=True), rest_length=0.0)
         filaments.add_linkers(own, count, volume=1e9)
         _, system, positions = filaments.build()
         pull = openmm.CustomExternalForce(f"-{tension * PN}*x")
@@ -159,10 +165,9 @@ def test_loops_grow_against_the_tension_of_the_chain_and_stall():
             continue
         # Between the hand and the joint beyond it.
         outer = np.stack([tables[0][:, 0], -tables[0][:, 1]], axis=1) % SEGMENT
-        loops = np.diff(tables[0], axis=1).mean()
-        expected = way_of_hands(outer, tension, loops, stall, speed, 25000 * step * 1e-12)
+        expected = way_of_hands(outer, tension, loop, stiffness, stall, speed, 25000 * step * 1e-12)
         error = (ways - expected).std(ddof=1) / np.sqrt(ways.size)
-        assert abs((ways - expected).mean()) < 4 * error and 4 * error < 0.05 * speed * 0.5
+        assert abs((ways - expected).mean()) < 4 * error and 4 * error < 0.03 * expected.mean()
 
 
 def test_presets_extrude():
