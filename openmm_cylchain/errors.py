@@ -109,4 +109,5 @@ class TimeStepWarning(UserWarning):
 
 
 class TwistWarning(UserWarning):
-    """A torque on an end of a filament that winds it up without end: the message says which, and what to do."""
+    """A torque that winds a filament up without end, or turns that one has lost: the message says which, and what to
+    do."""

@@ -16,6 +16,7 @@ from ..filaments.chain_type import ChainType
 from ..filaments.collection import FilamentCollection, held_numbers, require_filaments
 from ..filaments.filaments_that_take_part import FilamentsThatTakePart
 from ..filaments.grown import longest_segment
+from ..filaments.twist import has_twist
 from ..units.quantities import (
     LARGEST_INT,
     LENGTH,
@@ -41,6 +42,8 @@ _DEEPEST_BOW = 0.1
 
 # Along the contour, in diameters. Segments that are nearer do not touch each other.
 _EXCLUDED_DIAMETERS = 2.0
+# Of filaments with twist, which torque may fold: two turns are lost where they pass through themselves.
+_EXCLUDED_DIAMETERS_WITH_TWIST = 1.5
 
 
 def default_capsule_stiffness(diameter: Scalar, temperature: Scalar) -> float:
@@ -117,7 +120,8 @@ def capsule_contact_force(
     particle_diameter : length, or array of lengths, one for each of ``particles``
     excluded_neighbors : int, optional
         Segments of one filament whose numbers differ by no more than this do not touch each other. If not given: those
-        that are within two diameters along the contour; at least 1.
+        that are within two diameters along the contour, or one and a half of filaments with twist, whose tight loops
+        must not lose turns there; at least 1.
     periodic : bool, optional
         Whether distances are those of nearest images. If not given: whether the System has a box, or another force
         that is periodic.
@@ -178,7 +182,8 @@ def capsule_contact_force(
         neighbors = excluded_neighbors
         if neighbors is None:
             shortest = _capsule_lengths(filament, ends).min()
-            neighbors = max(1, math.ceil(_EXCLUDED_DIAMETERS * value / shortest - 1e-9))
+            diameters_apart = _EXCLUDED_DIAMETERS_WITH_TWIST if has_twist(filament.type) else _EXCLUDED_DIAMETERS
+            neighbors = max(1, math.ceil(diameters_apart * value / shortest - 1e-9))
         force.addChain([int(end) for end in ends], float(value), neighbors, filament.closed)
     for particle, value in zip(spheres, sphere_diameters):
         force.addSphere(int(particle), float(value))

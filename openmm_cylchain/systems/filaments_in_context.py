@@ -9,6 +9,7 @@ import numpy.typing as npt
 import openmm
 from openmm import unit
 
+from ..analysis.linking import writhe
 from ..couplings.beam_curves import BeamCurves
 from ..couplings.shapes import Plane
 from ..engines.compiled_twist import set_twists_of, twists_of
@@ -17,7 +18,7 @@ from ..engines.protocol import Engine, PlacedFilaments
 from ..errors import InputError
 from ..filaments.filament import Tether
 from ..filaments.refusals import refuse_beams, refuse_growth, refuse_twist
-from ..filaments.twist import end_number, has_twist
+from ..filaments.twist import FILAMENT_ENDS, end_number, has_twist
 from ..kinetics.binding_force import (
     find_binding_force,
     naming_unknown_linkers,
@@ -348,6 +349,37 @@ class FilamentsInContext:
             For a filament that does not exist or has no twist.
         """
         return twists_of(self._context, self._twisted(filament)) * unit.radian
+
+    def linking_number(self, filament: int) -> float:
+        """Linking number Lk of a ring with twist, or by how much the frames at the ends of a filament have turned.
+
+        The sum of twists over 2 pi, those at rest among them, and the writhe: a number that changes by two where a
+        strand passes through another. The writhe of an open filament is that with straight ends, a thousand times as
+        long as itself, along the directions of its frames: its Lk is that turn of the frame at the plus end against the
+        one at the minus end where both directions are the same, to a thousandth. The time is that of all pairs of
+        segments.
+
+        Parameters
+        ----------
+        filament : int
+
+        Raises
+        ------
+        InputError
+            For a filament that does not exist, has no twist, or lacks a frame at an end.
+        """
+        number = self._twisted(filament)
+        own = self._placed.filaments[number]
+        positions = self._context.getState(positions=True).getPositions(asNumpy=True)._value
+        nodes = positions[self._placed.node_indices[number]]
+        if not own.closed:
+            frames = {frame.end: frame for frame in self._placed.end_frames if frame.filament == number}
+            if len(frames) < 2:
+                raise InputError(f"Filament {number} has no linking number: it is no ring, and lacks a frame at an end.")
+            length = 1e3 * own.segments * own.type.segment_length
+            ends = [length * np.array(frames[end].direction) for end in FILAMENT_ENDS]
+            nodes = np.vstack([nodes[0] - ends[0], nodes, nodes[-1] + ends[1]])
+        return float(twists_of(self._context, number).sum()) / (2.0 * np.pi) + writhe(nodes, own.closed)
 
     def set_twists(self, filament: int, twists: npt.ArrayLike) -> None:
         """Give a filament other twists, such as those of another run, or of a ring that is closed with some turns.
