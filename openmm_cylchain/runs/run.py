@@ -35,6 +35,7 @@ from .created_simulation import begin, create_simulation, platform_of, stage_sim
 from .description import describe
 from .errors_of_tables import located_errors, located_instability
 from .initial_state import build_system
+from .lost_turns import LostTurns
 from .moving_tethers import MovingTethers
 from .relaxation import relaxed_positions
 from .rows_of_forces import RowsOfForces
@@ -259,6 +260,8 @@ class Recorder:
         self._moving = MovingTethers(stage, filaments)
         self._framed = sorted({frame.filament for frame in filaments.end_frames})
         self._twisted = any(has_twist(own.type) for own in filaments)
+        # Without contacts, strands pass through each other anyway.
+        self._lost_turns = LostTurns(filaments) if self._twisted and configuration.contacts_of_filaments else None
         self._absent = [number for number, own in enumerate(filaments) if not own.takes_part]
         self._grows = any(filament.growth is not None for filament in filaments)
         self._rows = RowsOfForces(self._stages, configuration)
@@ -412,6 +415,8 @@ class Recorder:
             self._twist.write(self._step, (self._stage.time(self._step), *row))
         if self._twisted:
             self._twists.measure(context, self._step)
+        if self._lost_turns:
+            self._lost_turns.look(context)
 
     def _without_absent(self, positions):
         # Of a filament that is not there, all particles are in one place: that of a node that stands still.

@@ -375,7 +375,9 @@ class FilamentsInContext:
         if not own.closed:
             frames = {frame.end: frame for frame in self._placed.end_frames if frame.filament == number}
             if len(frames) < 2:
-                raise InputError(f"Filament {number} has no linking number: it is no ring, and lacks a frame at an end.")
+                raise InputError(
+                    f"Filament {number} has no linking number: it is no ring, and lacks a frame at an end."
+                )
             length = 1e3 * own.segments * own.type.segment_length
             ends = [length * np.array(frames[end].direction) for end in FILAMENT_ENDS]
             nodes = np.vstack([nodes[0] - ends[0], nodes, nodes[-1] + ends[1]])

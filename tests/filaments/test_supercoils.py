@@ -51,7 +51,7 @@ class SupercoilSimulation:
         for origin in origins:
             filaments.add_ring(KIND, ring.segments, origin)
         _, system, _ = filaments.build()
-        self.forces = [capsule_contact_force(filaments, system, ring.diameter)]
+        self.forces = [capsule_contact_force(filaments, system, ring.diameter, excluded_neighbors=ring.excluded)]
         if ring.wall:
             slab = Slab([0, 0, 0], [0, 0, 1], ring.slab)
             self.forces.append(filament_wall_force(filaments, system, slab, ring.wall * KT))
