@@ -58,6 +58,7 @@ from .filaments.presets import (
     TUBULIN,
     TUBULIN_IN_MITOSIS,
 )
+from .filaments.rest_bends import RestBends
 from .filaments.segment_place import SegmentPlace
 from .filaments.severing import Severing
 from .filaments.shapes import FilamentOptions
@@ -159,6 +160,7 @@ __all__ = [
     "ObservableCheck",
     "Plane",
     "PrecisionWarning",
+    "RestBends",
     "RunReporter",
     "SegmentFriction",
     "SegmentLengthWarning",

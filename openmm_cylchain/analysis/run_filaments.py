@@ -39,6 +39,8 @@ class RunFilament:
     monomer_length : float
         By which it grows, in nm; zero if it does not. Its particles are then nodes as far as ``Run.growth`` says, and
         the others are where the last node is.
+    bent_at_rest : bool
+        Whether its joints are.
     """
 
     type: Any
@@ -51,6 +53,7 @@ class RunFilament:
     planar: bool = False
     load: str = ""
     monomer_length: float = 0.0
+    bent_at_rest: bool = False
 
     @property
     def label(self) -> str:
@@ -105,4 +108,5 @@ def described_filament(own: DescribedFilament) -> RunFilament:
         own.planar,
         own.load,
         own.monomer_length,
+        own.bent_at_rest,
     )

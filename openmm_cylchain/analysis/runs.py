@@ -167,7 +167,9 @@ class Run:
         """Twists in radians of each filament in a frame, as ``FilamentsInContext.twists`` has them: none of one
         without twist."""
         frame = self._frame(frame)
-        counts = [len(own.nodes) if has_twist(own.type) else 0 for own in self.filaments]
+        counts = [
+            len(own.nodes) + (own.ring and own.bent_at_rest) if has_twist(own.type) else 0 for own in self.filaments
+        ]
         if not any(counts):
             return [np.zeros(0)] * len(counts)
         record = self._twist_records[np.searchsorted(self._twist_records["step"], self.steps[frame])]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import InputError
 from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, Scalar
 from .run_filaments import chain_of
@@ -81,6 +82,8 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
             continue
         if number in grown:
             chains += grown[number].virial
+        elif own.bent_at_rest:
+            raise InputError(f"Filament {number} has bends at rest, whose stress is not known.")
         else:
             parts = positions[own.nodes], positions[own.control_points]
             chains += own.type.segment_kind.virial(chain_of(own, run.temperature), *parts)

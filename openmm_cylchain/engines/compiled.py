@@ -252,6 +252,7 @@ def _add_chain(force, filament, nodes, viscosity, temperature):
     if has_twist(kind):
         of_joints = ([own] * len(stiffnesses) for own in (kind.twist_stiffness, kind.rest_twist))
         force.setChainTwist(chain, *of_joints, [kind.axial_friction(viscosity)] * filament.segments)
+        force.setChainRestBends(chain, filament.components_of_rest_bends.ravel().tolist())
 
 
 def _add_body(force, placed, particles, viscosity):

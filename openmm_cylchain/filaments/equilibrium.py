@@ -19,6 +19,7 @@ from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from ..mechanics.geometry import directions_across
 from ..units.quantities import TEMPERATURE, positive, thermal_energy, true_or_false
@@ -160,6 +161,36 @@ class PlanarJointAngleDistribution(_Marginal):
         angle = _grid(-widest, widest)
         with np.errstate(divide="ignore", over="ignore"):
             super().__init__(angle, -np.asarray(filament_type.bending_energy(np.cos(angle), joint_stiffness)) / kT)
+
+
+class BentJointDistribution(_Marginal):
+    """Equilibrium distribution of the cosine of a joint with a bend at rest, for frames that rest.
+
+    With the sizes k of R k (see ``RestBends``) and b of the bend, and the Bessel function I0, it is
+
+        rho(c) ~ exp(-K (b^2 + k^2)/2 k_B T) I0(K b k/k_B T)
+
+    on [-1, 1]. The angle from R k to b has the von Mises distribution with the concentration K b k/k_B T.
+    """
+
+    def __init__(
+        self, filament_type: IndependentJoints, temperature: Scalar, joint_stiffness: float, rest_bend: float
+    ) -> None:
+        kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
+        self._size_of = lambda cosine: np.sqrt(2.0 * np.asarray(filament_type.bending_energy(cosine, 1.0)))
+        self._concentration_of_size = joint_stiffness * rest_bend / kT
+        widest = 0.5 * (rest_bend + np.sqrt(2.0 * _widest_bend(joint_stiffness / kT))) ** 2
+        cosine = _grid(1.0 - min(2.0, widest), 1.0)
+        with np.errstate(divide="ignore", over="ignore"):
+            size = self._size_of(cosine)
+            weight = -0.5 * joint_stiffness / kT * (size - rest_bend) ** 2
+            super().__init__(
+                cosine, weight + np.log(scipy.special.i0e(self._concentration_of_size * np.minimum(size, 1e150)))
+            )
+
+    def concentration(self, cosine: float) -> float:
+        """That of the angle from R k to the bend."""
+        return float(self._concentration_of_size * self._size_of(cosine))
 
 
 def _widest_bend(stiffness):

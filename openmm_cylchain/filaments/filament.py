@@ -27,6 +27,7 @@ from ..units.types import FloatArray
 from .chain_type import Chain, ChainType
 from .growth import Growth
 from .placement import joint_stiffnesses
+from .rest_bends import RestBends
 
 NODE_NAME = "NOD"
 """Atom name of a filament node in topologies."""
@@ -65,6 +66,8 @@ class Filament:
         It has not begun yet: both of its nodes are in one place, which is no place of a filament.
     nucleation : kinetics.nucleation.Nucleation or None
         How those that have not begun do so, if not as a part of one that is cut.
+    rest_bends : RestBends or None
+        By how much its joints are bent at rest, if they are.
     takes_part : bool
         Linkers bind to it. One that does not stands aside: see ``Filaments.set_aside``.
     """
@@ -82,6 +85,7 @@ class Filament:
     is_reserve: bool = False
     nucleation: Any = None
     takes_part: bool = True
+    rest_bends: RestBends | None = None
 
     def __post_init__(self) -> None:
         require_kind(self.type, ChainType, "Filament: type")
@@ -117,6 +121,18 @@ class Filament:
         """
         return joint_stiffnesses(self.type, len(self.positions), self.clamped, self.closed)
 
+    @property
+    def components_of_rest_bends(self) -> FloatArray:
+        """(joints, 2), see ``RestBends.components``; no joints if it has no bends at rest."""
+        if self.rest_bends is None:
+            return np.zeros((0, 2))
+        return self.rest_bends.components(self.type.bending_model, self.bends)
+
+    @property
+    def twists(self) -> int:
+        """How many a filament with twist has: a ring with rest_bends has one of its first frame, too."""
+        return len(self.positions) + (self.closed and self.rest_bends is not None)
+
     def beam_element(self, temperature: float) -> BeamElement:
         """What its beam elements are made of, see ``FilamentType.beam_element``."""
         return self.type.beam_element(temperature, self.planar)
@@ -135,6 +151,11 @@ class Filament:
         self, nodes: FloatArray, control_points: FloatArray | None, temperature: float
     ) -> tuple[FloatArray, FloatArray]:
         """Those of its segments (..., segments) and of its bends (..., bends), with node positions (..., n, 3)."""
+        if self.rest_bends is not None:
+            raise InputError(
+                f"A filament of {self.type.name} has bends at rest: its energies depend on its frames, too. "
+                "FilamentsInContext.energies has them."
+            )
         chain = Chain(self.type, self.clamped, self.closed, self.planar, temperature)
         return self.type.segment_kind.energies(chain, nodes, control_points)
 

@@ -134,8 +134,9 @@ class FilamentType(ChainType):
     Twist is for straight segments of open filaments and rings in space, with scheme "implicit" of the compiled engine.
     Each segment has a material frame, which turns about the segment against the friction 4 pi eta (d/2)^2 l0 of a
     cylinder; m is the angle between two of them beyond parallel transport. What holds frames at its ends is added by
-    ``Filaments.add_end_frame``. The filament bends as easily in all directions of its frames, and is straight at rest:
-    so its intrinsic twist is what twists and linking numbers are counted from, and changes neither shapes nor torques.
+    ``Filaments.add_end_frame``. The filament bends as easily in all directions of its frames, and is straight at rest
+    unless it has ``rest_bends`` (``RestBends``): so its intrinsic twist is what twists and linking numbers are counted
+    from, and changes neither shapes nor torques.
 
     A type keeps the persistence length as ``bending_rigidity`` a = l_p k_B T, the rigidity of the continuous filament,
     with the ``temperature``: the two together mean the same as l_p = a/k_B T with the temperature. So

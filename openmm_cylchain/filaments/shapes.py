@@ -1,5 +1,6 @@
 """Shapes of new filaments: straight ones, rings, draws from equilibrium and given ones, with what they are given."""
 
+from dataclasses import replace
 from typing import Any, TypedDict
 
 import numpy as np
@@ -19,7 +20,8 @@ from ..units.types import Indices, Scalar, Vector, Vectors
 from .chain_type import ChainType, Points
 from .filament import Filament
 from .growth import Growth, check_growth
-from .placement import check_shape, in_one_plane, planar_direction
+from .placement import check_shape, in_one_plane, joint_stiffnesses, planar_direction
+from .rest_bends import RestBends, check_rest_bends, draw_bent_chain
 
 MINIMUM_RING = 4
 """Segments that a ring has at least."""
@@ -102,6 +104,7 @@ def drawn(
     direction: Vector | None,
     clamped: int | Indices,
     planar: bool,
+    rest_bends: RestBends | None,
     label: str,
 ) -> Points:
     """A filament from the exact equilibrium of the free discrete chain."""
@@ -113,6 +116,11 @@ def drawn(
         direction = planar_direction(direction, label) if planar else direction
     if temperature == 0:
         raise InputError(f"{label}: an equilibrium draw needs a temperature above zero.")
+    if rest_bends is not None:
+        check_rest_bends(rest_bends, filament_type, segments - 1, planar, False, label)
+        stiffnesses = joint_stiffnesses(filament_type, segments + 1, (), False)
+        rest = rest_bends.components(filament_type.bending_model, segments - 1)
+        return draw_bent_chain(filament_type, temperature, generator, start, direction, rest, stiffnesses), None
     return filament_type.segment_kind.draw(
         filament_type, segments, temperature, generator, start, direction, clamped, planar, label
     )
@@ -137,6 +145,8 @@ class FilamentOptions(TypedDict, total=False):
         moves with its first node in front. It is not conservative and has no energy.
     growth : Growth
         How the filament grows and shrinks at its ends. Its first node is its minus end.
+    rest_bends : RestBends
+        By how much the joints of a filament with twist are bent at rest: curved DNA.
     """
 
     clamped: int | Indices
@@ -144,6 +154,7 @@ class FilamentOptions(TypedDict, total=False):
     planar: bool
     propulsion: Scalar
     growth: Growth | None
+    rest_bends: RestBends | None
 
 
 def new_filament(
@@ -156,6 +167,7 @@ def new_filament(
     planar: bool = False,
     propulsion: Scalar = 0.0,
     growth: Growth | None = None,
+    rest_bends: RestBends | None = None,
 ) -> Filament:
     """A Filament with nodes and control points, and FilamentOptions.
 
@@ -177,9 +189,13 @@ def new_filament(
     spare = 0
     if growth is not None:
         spare = check_growth(growth, filament_type, len(positions) - 1, closed, held, label)
-    return Filament(
+    filament = Filament(
         filament_type, positions, held, closed, planar, propulsion, control_points, held_tangents, growth, spare
     )
+    if rest_bends is None:
+        return filament
+    check_rest_bends(rest_bends, filament_type, filament.bends, planar, growth is not None, label)
+    return replace(filament, rest_bends=rest_bends)
 
 
 def reserve_filament(

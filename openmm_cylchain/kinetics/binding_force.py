@@ -177,6 +177,12 @@ def _add_hand(force, hand, filaments, name):
     force.setHandSliding(number, hand.sliding_friction or 0.0)
     if hand.helix is not None:
         for i in every:
+            if filaments[i].rest_bends is not None:
+                raise InputError(
+                    f"Linkers {name!r}: a hand follows a helix, but binds to filament {i} "
+                    f"({filaments[i].type.name}), which has rest_bends, and cannot be turned as yet: name others in "
+                    "binds_to."
+                )
             if not has_twist(filaments[i].type):
                 raise InputError(
                     f"Linkers {name!r}: a hand follows a helix, but binds to filament {i} "

@@ -1,5 +1,7 @@
 """Directions that turn with the material of twisted chains."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..units.types import FloatArray
@@ -37,3 +39,75 @@ def material_vectors(nodes: FloatArray, closed: bool, twists: FloatArray, rest: 
     turns[0] = 0.0 if closed else twists[0]
     angles = np.cumsum(turns)[:, None]
     return np.cos(angles) * untwisted + np.sin(angles) * np.cross(tangents, untwisted)
+
+
+def first_vector(direction: FloatArray) -> FloatArray:
+    """The unit vector (3,) across a unit vector from which the frame of the first segment is counted.
+
+    Duff et al., J. Comput. Graph. Tech. 2017, 6, 1.
+    """
+    x, y, z = direction
+    sign = np.copysign(1.0, z)
+    a = -1.0 / (sign + z)
+    return np.array([1.0 + sign * x * x * a, sign * x * y * a, -sign * x])
+
+
+def transported(vectors: FloatArray, before: FloatArray, behind: FloatArray) -> FloatArray:
+    """Vectors (..., 3) across unit vectors, carried over to other ones by parallel transport."""
+    along = np.sum(vectors * behind, axis=-1) / (1.0 + np.sum(before * behind, axis=-1))
+    return vectors - along[..., None] * (before + behind)
+
+
+def turned(vectors: FloatArray, axes: FloatArray, angles: FloatArray) -> FloatArray:
+    """Vectors (..., 3) across unit vectors, turned about these by angles (...)."""
+    angles = np.asarray(angles)[..., None]
+    return np.cos(angles) * vectors + np.sin(angles) * np.cross(axes, vectors)
+
+
+def bends_in_material(
+    nodes: FloatArray,
+    closed: bool,
+    twists: FloatArray,
+    beyond: FloatArray,
+    energy: Callable[[FloatArray], FloatArray],
+) -> FloatArray:
+    """Bends b (..., joints, 2) in the material frames half-way over their joints: see ``RestBends``.
+
+    Parameters
+    ----------
+    nodes : (..., n, 3) array
+    closed : bool
+        Whether the last node is joined to the first.
+    twists : (..., n) array, or (..., n + 1) if closed
+        In radians. The first one of an open chain, or the last of a closed one, is how far the frame of the first
+        segment is turned.
+    beyond : (3,) array
+        The direction from which that is counted.
+    energy : callable
+        That of a joint with the stiffness one as a function of its cosine, b^2/2.
+    """
+    vectors = np.diff(nodes, axis=-2, append=nodes[..., :1, :]) if closed else np.diff(nodes, axis=-2)
+    tangents = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    count = tangents.shape[-2]
+    beyond = np.broadcast_to(np.asarray(beyond, dtype=float), tangents[..., 0, :].shape)
+    first = np.broadcast_to(first_vector(beyond.reshape(-1, 3)[0]), beyond.shape)
+    axis = turned(transported(first, beyond, tangents[..., 0, :]), tangents[..., 0, :], twists[..., count * closed])
+    found = []
+    for s in range(1, count + closed):
+        before, behind = tangents[..., s - 1, :], tangents[..., s % count, :]
+        bisector = before + behind
+        bisector = bisector / np.linalg.norm(bisector, axis=-1, keepdims=True)
+        half = 0.5 * twists[..., s % count]
+        axis = turned(transported(axis, before, bisector), bisector, half)
+        bent = behind - before
+        size = np.linalg.norm(bent, axis=-1)
+        # 1-c of the cosine is half the square of that, without a loss of digits.
+        bend = np.sqrt(2.0 * energy(1.0 - 0.5 * size**2)) / np.where(size > 0.0, size, 1.0)
+        bent = bend[..., None] * bent
+        axes = axis, np.cross(bisector, axis)
+        found.append(np.stack([np.sum(bent * own, axis=-1) for own in axes], axis=-1))
+        axis = transported(turned(axis, bisector, half), bisector, behind)
+    if not found:
+        return np.zeros((*nodes.shape[:-2], 0, 2))
+    # Joints of a ring begin at its first node.
+    return np.stack(found[-1:] + found[:-1] if closed else found, axis=-2)

@@ -178,10 +178,16 @@ class FilamentReporter(FilamentsReporter):
         controls, temperature = self._filaments.control_point_indices, self._filaments.temperature
         monomers = _monomers(self._filaments, simulation.context)
         rows = [
-            _describe(filament, positions[nodes], positions[own], temperature, monomers.get(number))
+            self._describe_bent(simulation, number, positions[nodes])
+            if filament.rest_bends is not None
+            else _describe(filament, positions[nodes], positions[own], temperature, monomers.get(number))
             for number, (filament, nodes, own) in enumerate(zip(self._filaments, self._nodes, controls))
         ]
         return range(len(rows)), rows
+
+    def _describe_bent(self, simulation, number, nodes):
+        energies = self._filaments.in_context(simulation.context).energies(number)
+        return _row(self._filaments[number], [np.sum(own._value) for own in energies], nodes, None)
 
 
 def _monomers(filaments, context):
@@ -200,6 +206,10 @@ def _describe(filament, nodes, control_points, temperature, monomers):
         if not chain.nodes:
             return (np.nan,) * 4
         energies = chain.energies
+    return _row(filament, energies, nodes, control_points)
+
+
+def _row(filament, energies, nodes, control_points):
     end_to_end_distance = 0.0 if filament.closed else np.linalg.norm(nodes[-1] - nodes[0])
     lengths = filament.type.segment_kind.lengths(nodes, control_points, filament.closed)
     return *energies, end_to_end_distance, lengths.sum()

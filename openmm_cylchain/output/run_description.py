@@ -40,6 +40,8 @@ class DescribedFilament:
         What pulls at it, such as "0.2 pN", where loads differ; else empty.
     monomer_length : float
         By which it grows, in nm; zero if it does not.
+    bent_at_rest : bool
+        Whether its joints are.
     """
 
     type: ChainType
@@ -51,6 +53,7 @@ class DescribedFilament:
     planar: bool = False
     load: str = ""
     monomer_length: float = 0.0
+    bent_at_rest: bool = False
 
     @property
     def diameter(self) -> float:
@@ -195,6 +198,7 @@ class RunDescription:
                     "planar": own.planar,
                     **({"load": own.load} if own.load else {}),
                     **({"monomer_length": own.monomer_length} if own.monomer_length else {}),
+                    **({"bent_at_rest": True} if own.bent_at_rest else {}),
                     **(
                         {"control_points": own.control_points, "clamped_tangents": own.clamped_tangents}
                         if own.control_points
@@ -238,6 +242,7 @@ def read_run_description(path: Path) -> RunDescription:
                 own.get("planar", False),
                 own.get("load", ""),
                 own.get("monomer_length", 0.0),
+                own.get("bent_at_rest", False),
             )
             for own in content["filaments"]
         )

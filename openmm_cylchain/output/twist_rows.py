@@ -37,7 +37,7 @@ class TwistFile(RecordFile):
     def __init__(self, path: Path, filaments: FilamentCollection, count: int | None = None) -> None:
         self._filaments = filaments
         self._numbers = [number for number, own in enumerate(filaments) if has_twist(own.type)]
-        joints = sum(len(filaments.node_indices[number]) for number in self._numbers)
+        joints = sum(filaments[number].twists for number in self._numbers)
         super().__init__(path, np.dtype([("step", "<i8"), ("twists", "<f8", (joints,))]), "twists", count)
 
     def measure(self, context: openmm.Context, step: int) -> None:
@@ -50,5 +50,5 @@ class TwistFile(RecordFile):
 
     def _twists_of(self, here, number):
         # A filament that has gone has none.
-        there = self._filaments[number].takes_part
-        return here.twists(number)._value if there else np.zeros(len(self._filaments.node_indices[number]))
+        filament = self._filaments[number]
+        return here.twists(number)._value if filament.takes_part else np.zeros(filament.twists)

@@ -405,6 +405,7 @@ def _disturbed(configuration):
             "flow": configuration.flow is not None and not configuration.flow.is_at_rest,
             "propulsion": group.propulsion != 0.0,
             "growth": group.growth is not None,
+            "rest_bends": group.rest_bends is not None,
         }
         disturbed = tuple(name for name, there in reasons.items() if there)
         tension = _tension_of(numbers, configuration.pulls) if disturbed == ("forces",) else None

@@ -311,6 +311,7 @@ def _add(filaments, group, nodes, control_points, kinetics):
         planar=group.planar,
         propulsion=group.propulsion,
         growth=_growth(group, kinetics),
+        rest_bends=group.rest_bends,
     )
 
 
@@ -406,7 +407,7 @@ def _shape(group, temperature, seed, number, places, attempt=0):
             if group.planar:
                 direction = (*direction[:2], 0.0)
         return shapes.straight(kind, group.segments, origin, direction, label)
-    own = origin, direction, group.clamped, group.planar, label
+    own = origin, direction, group.clamped, group.planar, group.rest_bends, label
     return shapes.drawn(kind, group.segments, temperature, generator, *own)
 
 

@@ -21,7 +21,6 @@ from ..output.progress import RunProgress
 from ..output.run_tables import ReportTable, TrajectoryFile
 from ..output.twist_rows import TwistFile, rows_of_twist
 from ..systems.described_runs import (
-    energies_of_growing,
     energy_cells,
     growth_in,
     total_energies,
@@ -389,7 +388,7 @@ class Recorder:
         state = context.getState(positions=True)
         positions = state.getPositions(asNumpy=True).value_in_unit(unit.nanometer)
         growth = growth_in(context, self._filaments)
-        stretching, bending = energies_of_growing(context) if growth else total_energies(self._filaments, positions)
+        stretching, bending = total_energies(self._filaments, context, positions)
         self._check_finite(positions, stretching, bending)
         self._trajectory.write(self._without_absent(positions))
         self._energies.write(

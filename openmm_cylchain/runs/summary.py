@@ -46,6 +46,7 @@ _DISTURBANCES = {
     "tethers": "tethers hold them in several places",
     "flow": "the solvent flows",
     "propulsion": "they propel themselves",
+    "rest_bends": "their joints are bent at rest",
 }
 
 
@@ -233,7 +234,7 @@ def _series_of_cylinders(group, temperature, trajectory, members):
     yield "segment length", "nm", lengths.mean(axis=2), float(distribution.mean(lambda length: length))
     if group.joints:
         cosines = np.stack(joint_cosines(trajectory, members), axis=1)
-        if kind.bending_rigidity > 0:
+        if kind.bending_rigidity > 0 and group.rest_bends is None:
             yield (
                 "bending energy per joint",
                 "kT",

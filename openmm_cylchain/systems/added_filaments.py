@@ -250,6 +250,7 @@ class AddedFilaments:
 
         Segment lengths come from rho(l), joint angles from rho(c) (see ``filaments.equilibrium``), or, if the
         filament is planar, from those of two dimensions. Beam elements are drawn from theirs (``beams.equilibrium``).
+        With ``rest_bends``, bends are drawn for the twists at rest with which a Context begins.
 
         Parameters
         ----------
@@ -273,7 +274,16 @@ class AddedFilaments:
         generator = np.random.default_rng(whole_number(seed, 0, f"{label}: seed"))
         clamped, planar = options.get("clamped", ()), options.get("planar", False)
         points = shapes.drawn(
-            filament_type, segments, self._temperature, generator, start, direction, clamped, planar, label
+            filament_type,
+            segments,
+            self._temperature,
+            generator,
+            start,
+            direction,
+            clamped,
+            planar,
+            options.get("rest_bends"),
+            label,
         )
         return self._add(filament_type, points, label, False, options)
 

@@ -79,6 +79,7 @@ def describe_system(
                 tuple(own.clamped_tangents),
                 own.planar,
                 monomer_length=0.0 if own.growth is None else own.growth.monomers.length,
+                bent_at_rest=own.rest_bends is not None,
             )
             for own, nodes, controls in zip(filaments, filaments.node_indices, filaments.control_point_indices)
         ),
@@ -191,8 +192,11 @@ def _particle_masses(filaments, system):
     return masses
 
 
-def total_energies(filaments: Any, positions: FloatArray) -> tuple[float, float]:
-    """Stretching and bending energy of all filaments that are there in kJ/mol, for positions in nm."""
+def total_energies(filaments: Any, context: openmm.Context, positions: FloatArray) -> tuple[float, float]:
+    """Stretching and bending energy of all filaments that are there in a Context in kJ/mol, for its positions in nm."""
+    if any(own.growth is not None or own.rest_bends is not None for own in filaments):
+        # The Context alone knows lengths at rest, and frames.
+        return _energies_in(context)
     stretching = bending = 0.0
     for filament, nodes, controls in zip(filaments, filaments.node_indices, filaments.control_point_indices):
         if not filament.takes_part:
@@ -211,8 +215,7 @@ def growth_in(context: openmm.Context, filaments: Any) -> FilamentGrowth | None:
     return filaments.in_context(context).growth()
 
 
-def energies_of_growing(context: openmm.Context) -> tuple[float, float]:
-    """Those of ``total_energies`` where some filaments grow, from a Context, which knows their lengths at rest."""
+def _energies_in(context):
     kind: Any = load_plugin().CylinderChainForce
     (force,) = (kind.cast(own) for own in context.getSystem().getForces() if kind.isinstance(own))
     stretching, bending = force.computeEnergies(context)

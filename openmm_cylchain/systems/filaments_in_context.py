@@ -18,6 +18,7 @@ from ..engines.protocol import Engine, PlacedFilaments
 from ..errors import InputError
 from ..filaments.filament import Tether
 from ..filaments.refusals import refuse_beams, refuse_growth, refuse_twist
+from ..filaments.rest_bends import bending_energies_at_rest
 from ..filaments.twist import FILAMENT_ENDS, end_number, has_twist
 from ..kinetics.binding_force import (
     find_binding_force,
@@ -31,6 +32,7 @@ from ..kinetics.growth_force import FilamentGrowth, contours_in, cut_by, growth_
 from ..kinetics.linker_table import LinkerTable
 from ..kinetics.linkers import LinkerPulls
 from ..mechanics.flow import Flow
+from ..mechanics.geometry import segment_vectors
 from ..mechanics.tension import components_along, filament_tensions
 from ..units.quantities import (
     ANGLE,
@@ -341,7 +343,8 @@ class FilamentsInContext:
             The first is between the frame beyond the minus end and the first segment, the last between the last segment
             and the frame beyond the plus end, and those of joints are between these. Where an end is free, or its frame
             turns freely, its twist says how far the segment there has turned since the start. A ring has as many as
-            segments; the first is that at node 0.
+            segments; the first is that at node 0. One with ``rest_bends`` has one more, of its first frame: see
+            ``RestBends``.
 
         Raises
         ------
@@ -401,6 +404,42 @@ class FilamentsInContext:
             raise InputError(f"twists must have the shape ({count},), but have {values.shape}.")
         set_twists_of(self._context, number, values)
 
+    def energies(self, filament: int) -> tuple[unit.Quantity, unit.Quantity]:
+        """Stretching energies of the segments of a filament, and bending energies of its joints or beam elements.
+
+        Those of joints with ``rest_bends`` are those for the twists that the filament has. Energies of twist are not
+        among them. Of filaments that grow, they are those of segments as they were added.
+
+        Parameters
+        ----------
+        filament : int
+
+        Returns
+        -------
+        tuple of two Quantities in kJ/mol
+        """
+        number = self._number(filament)
+        own = self._placed.filaments[number]
+        positions = self._context.getState(positions=True).getPositions(asNumpy=True)._value
+        nodes = positions[self._placed.node_indices[number]]
+        if own.rest_bends is None:
+            controls = positions[self._placed.control_point_indices[number]]
+            found = own.energies_along(nodes, controls, self._placed.temperature)
+        else:
+            frames = [one.direction for one in self._placed.end_frames if (one.filament, one.end) == (number, "minus")]
+            lengths = np.linalg.norm(segment_vectors(nodes, own.closed), axis=-1)
+            bending = bending_energies_at_rest(
+                own.type,
+                nodes,
+                own.closed,
+                twists_of(self._context, number),
+                np.array(frames[0] if frames else (0.0, 0.0, 1.0)),
+                own.components_of_rest_bends,
+                own.joint_stiffnesses,
+            )
+            found = own.type.stretching_energies(lengths, own.closed), bending
+        return tuple(values * unit.kilojoule_per_mole for values in found)
+
     def turn_end(self, filament: int, end: str, angle: Scalar) -> None:
         """Turn the frame that holds an end of a filament, at once: turn it by little between steps.
 
@@ -421,14 +460,20 @@ class FilamentsInContext:
         frames = [own for own in self._placed.end_frames if (own.filament, own.end) == (number, end)]
         if not frames or not frames[0].is_held:
             raise InputError(f"The {end} end of filament {number} has no frame that is held: add it by add_end_frame.")
+        if side == 0 and self._placed.filaments[number].rest_bends is not None:
+            raise InputError(f"Filament {number} has rest_bends, which turn with its minus end: turn its plus end.")
         twists = twists_of(self._context, number)
         twists[-1 if side else 0] += finite_number(angle, ANGLE, "angle") * (1 if side else -1)
         set_twists_of(self._context, number, twists)
 
-    def _twisted(self, filament):
+    def _number(self, filament):
         number, count = whole_number(filament, 0, "filament"), len(self._placed.filaments)
         if number >= count:
             raise InputError(f"Filament {number} does not exist; there are {count}.")
+        return number
+
+    def _twisted(self, filament):
+        number = self._number(filament)
         if not has_twist(self._placed.filaments[number].type):
             raise InputError(f"Filament {number} has no twist: give its type a twist_persistence_length.")
         return number

@@ -41,7 +41,6 @@ from ..units.quantities import (
 from ..units.types import Scalar
 from .described_runs import (
     describe_system,
-    energies_of_growing,
     energy_cells,
     growth_in,
     total_energies,
@@ -236,7 +235,7 @@ class RunReporter:
         step, time = simulation.currentStep, state.getTime()._value
         positions = state.getPositions(asNumpy=True)._value
         growth = growth_in(simulation.context, self._filaments)
-        energies = energies_of_growing(simulation.context) if growth else total_energies(self._filaments, positions)
+        energies = total_energies(self._filaments, simulation.context, positions)
         cells = energy_cells(self._filaments, positions, *energies, self._kT, growth)
         # The energies come last: load takes a frame for whole that has a line there.
         self._trajectory.write(positions)

@@ -208,7 +208,7 @@ class ExactAverages:
         if kind is None or not self._free:
             return None
         one = kind.filament
-        if one.closed or one.clamped or one.propulsion:
+        if one.closed or one.clamped or one.propulsion or one.rest_bends is not None:
             return None
         if one.planar and not one.type.segment_kind.straight:
             return None

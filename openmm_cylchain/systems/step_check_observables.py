@@ -45,7 +45,7 @@ def _kinds(filaments):
     for number, one in enumerate(filaments):
         key = (one.type, one.segments, one.closed, one.planar, one.clamped, one.clamped_tangents, one.propulsion)
         own_frames = sorted(frames.get(number, []), key=lambda frame: frame.end)
-        key += tuple(replace(frame, filament=0) for frame in own_frames)
+        key += (one.rest_bends, *(replace(frame, filament=0) for frame in own_frames))
         groups.setdefault(key, []).append(number)
     kinds: list[Kind] = []
     for numbers in groups.values():
@@ -189,7 +189,12 @@ class Probe:
         waves = np.cos(np.outer(modes, np.pi * (np.arange(filament.segments) + 0.5) / filament.segments))
         amplitudes = self._scale(kind) * np.einsum("ms,fsk->mfk", waves, tangents)
         moved = [amplitudes, middle] if before is None else [amplitudes - before[0], middle - before[1]]
-        energies = filament.energies_along(nodes, positions[kind.control_points], self._temperature)
+        if filament.rest_bends is None:
+            energies = filament.energies_along(nodes, positions[kind.control_points], self._temperature)
+        else:
+            own = self._filaments.in_context(context)
+            found = [own.energies(number) for number in kind.numbers]
+            energies = [np.array([one[which]._value for one in found]) for which in (0, 1)]
         # Of a single straight segment, nothing bends.
         values = [*(own.sum(axis=1) / max(1, own.shape[1]) / self._kT for own in energies), np.sum(ends**2, axis=1)]
         if has_twist(filament.type):

@@ -184,6 +184,12 @@ class TiedFilaments(AddedFilaments):
             angular_velocity,  # type: ignore[arg-type]
             rotational_friction,  # type: ignore[arg-type]
         )
+        if own.rest_bends is not None and frame.end == "minus" and frame.angular_velocity != 0.0:
+            raise InputError(
+                f"{label}: filament {number} has rest_bends, which would turn with its minus end: turn its plus end."
+            )
+        if own.rest_bends is not None and frame.rotational_friction is not None:
+            raise InputError(f"{label}: filament {number} has rest_bends, and its frames cannot have a friction yet.")
         if any(other.filament == number and other.end == end for other in self._end_frames):
             raise InputError(f"{label}: the {end} end of filament {number} has a frame already.")
         self._end_frames.append(frame)

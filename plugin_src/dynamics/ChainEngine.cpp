@@ -104,7 +104,7 @@ ChainEngine::ChainEngine(const vector<Chain>& chains, const vector<PieceOfChain>
             if (lanes > bestKernels().wide.lanes || !mayShareLanes(longest, chains[members[last].back()]))
                 break;
         }
-        if (!longest.closed && !hasRange(longest.stretching))
+        if (!longest.closed && !hasRange(longest.stretching) && !longest.twist.isBentAtRest())
             implementation->wide.push_back(implementation->widePackOf(chains, first, last));
     }
     if (mayChange)
@@ -165,8 +165,8 @@ int ChainEngine::getNumMixedChains(const vector<int>& packs, const StepSettings&
 }
 
 ChainEnergy ChainEngine::addForces(int pack, const double* positions, double* forces, const double* box,
-            bool includeEnergy) const {
-    return bestKernels().addForces(implementation->packs[pack], positions, forces, box, includeEnergy);
+            bool includeEnergy, const vector<vector<double> >* twists) const {
+    return bestKernels().addForces(implementation->packs[pack], positions, forces, box, includeEnergy, twists);
 }
 
 ParticleRange ChainEngine::getParticles(int pack) const {

@@ -180,9 +180,10 @@ public:
      * @param box            the three vectors of a periodic box (nine doubles), to take each segment as its shortest
      *                       image, or NULL
      * @param includeEnergy  whether to compute the energies; they are zero otherwise
+     * @param twists         the twists of each chain, for energies of bends at rest; their forces are in steps alone
      */
-    ChainEnergy addForces(int pack, const double* positions, double* forces, const double* box,
-            bool includeEnergy) const;
+    ChainEnergy addForces(int pack, const double* positions, double* forces, const double* box, bool includeEnergy,
+            const std::vector<std::vector<double> >* twists = NULL) const;
     /**
      * Get the particles of a pack.
      */

@@ -6,6 +6,7 @@
  * function of one is used by another, and for up to CYLCHAIN_LANES lanes.
  */
 
+#include "dynamics/FrameTurns.h"
 #include "dynamics/LastChange.h"
 #include "dynamics/ModePack.h"
 #include "dynamics/PackPlaces.h"
@@ -41,6 +42,7 @@ typedef ChainPack<Scalar> Pack;
 #include "mechanics/StretchingModels-inl.h"
 #include "dynamics/TensionBand-inl.h"
 #include "dynamics/ImplicitState-inl.h"
+#include "dynamics/MaterialFrames-inl.h"
 #include "dynamics/coordinates/Coordinates-inl.h"
 #include "dynamics/ImplicitStages-inl.h"
 #include "dynamics/ImplicitNoise-inl.h"
@@ -115,12 +117,12 @@ template <int W = CYLCHAIN_LANES, class Function> auto withLanesOf(const Pack& p
 }
 
 ChainEnergy addForcesOfPack(const Pack& pack, const double* positions, double* forces, const double* box,
-            bool includeEnergy) {
+            bool includeEnergy, const std::vector<std::vector<double> >* twists) {
     return withLanesOf(pack, [&] (auto lanes) {
         if constexpr (isSmall<lanes>())
-            return CYLCHAIN_SMALL_PACKS().addForces(pack, positions, forces, box, includeEnergy);
+            return CYLCHAIN_SMALL_PACKS().addForces(pack, positions, forces, box, includeEnergy, twists);
         else
-            return addForcesTo<lanes>(pack, positions, forces, box, includeEnergy);
+            return addForcesTo<lanes>(pack, positions, forces, box, includeEnergy, twists);
     });
 }
 

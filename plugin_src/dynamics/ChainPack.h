@@ -30,7 +30,9 @@ template <class Scalar> struct PackTwist {
     std::vector<Scalar> friction;
     /** One for each lane whose chain has a joint to a frame at both ends, or is closed, so that all of it shares a torque. */
     std::vector<Scalar> held;
-    /** Whether there is one. */
+    /** The bends at rest of the joint at each node, [node][component][lane]; nothing if all joints are straight. */
+    std::vector<Scalar> bends;
+    /** Whether a chain is held. */
     bool isHeld = false;
     PackTwist() = default;
     PackTwist(int segments, int lanes) {
@@ -47,6 +49,9 @@ template <class Scalar> struct PackTwist {
     }
     bool isPresent() const {
         return !friction.empty();
+    }
+    bool isBentAtRest() const {
+        return !bends.empty();
     }
 };
 
@@ -140,7 +145,7 @@ struct ChainKernels {
     /** The largest number of lanes that fits a register. */
     int lanes;
     ChainEnergy (*addForces)(const ChainPack<double>& pack, const double* positions, double* forces, const double* box,
-            bool includeEnergy);
+            bool includeEnergy, const std::vector<std::vector<double> >* twists);
     Instability (*step)(const ChainPack<double>& pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements);
     /** A new object that takes an implicit step of a pack whose chains are coupled to others. */

@@ -68,22 +68,27 @@ template <int W> void gatherExactSegments(const Pack& pack, const double* positi
     }
 }
 
-/** Call a function with each twist in lanes: its chain and its number there, its node and its lane. */
+/**
+ * Call a function with each twist in lanes: its chain and its number there, its node and its lane. The one more of rings
+ * that are bent at rest, their last one, has the place of node 0, which is that of no joint there.
+ */
 template <int W, class Function> CYLCHAIN_INLINE void forTwists(const Pack& pack, Function function) {
+    const int ofFirst = pack.closed ? pack.segments : 0, ofLast = pack.closed ? 0 : pack.segments;
     forPlacesOfLanes<W>(numTwists(pack), [&] (int node, int i) {
-        if (pack.chain[i] >= 0 && node <= pack.segmentsOfLane[i] && !(pack.closed && node == 0))
-            function(pack.chain[i], pack.closed ? node%pack.segments : node, node, i);
+        if (pack.chain[i] < 0 || node > pack.segmentsOfLane[i] ||
+                (node == 0 && pack.closed && !pack.twist.isBentAtRest()))
+            return;
+        function(pack.chain[i], node == 0 ? ofFirst : node == pack.segments ? ofLast : node, node, i);
     });
 }
 
 /** Bring twists into lanes, less those at rest. */
-template <int W> void gatherTwists(const Pack& pack, const StepSettings& settings, TwistMemory& memory,
-            StepStart<W>& start) {
-    start.twists = memory.twists.reserve<typename Lanes<W>::Type>(numTwists(pack));
+template <int W> void gatherTwists(const Pack& pack, const std::vector<std::vector<double> >& ofChains,
+            typename Lanes<W>::Type* twists) {
     for (int node = 0; node < numTwists(pack); node++)
-        start.twists[node] = typename Lanes<W>::Type {};
+        twists[node] = typename Lanes<W>::Type {};
     forTwists<W>(pack, [&] (int chain, int joint, int node, int i) {
-        lane(start.twists[node], i) = (*settings.twists)[chain][joint]-pack.twist.rest[node*W+i];
+        lane(twists[node], i) = ofChains[chain][joint]-pack.twist.rest[node*W+i];
     });
 }
 
@@ -206,7 +211,9 @@ template <int W> __attribute__((noinline)) void gatherStepStart(const Pack& pack
     if (settings.flow.present)
         gatherStart<W>(pack, positions, box, start.nodes);
     gatherExactSegments<W>(pack, positions, box, memory, start);
-    gatherTwists<W>(pack, settings, memory, start);
+    start.twists = memory.twists.reserve<typename Lanes<W>::Type>(numTwists(pack));
+    if (pack.twist.isPresent())
+        gatherTwists<W>(pack, *settings.twists, start.twists);
     for (std::size_t i = 0; i < pack.tethers.size(); i++) {
         tetherVector(pack, pack.tethers[i], positions, box, start.tethers[i].d);
         if (pack.planar)

@@ -5,9 +5,9 @@
  */
 
 template <int W> ChainEnergy addForcesTo(const Pack& pack, const double* positions, double* forces,
-            const double* box, bool includeEnergy) {
+            const double* box, bool includeEnergy, const std::vector<std::vector<double> >* twists) {
     typedef typename Lanes<W>::Type Real;
-    static thread_local Scratch scratch;
+    static thread_local Scratch scratch, scratchOfTwists;
     Vector<Real>* x = scratch.reserve<Vector<Real>>(2*pack.nodes);
     Vector<Real>* f = x+pack.nodes;
     gatherPositions<W>(pack, positions, box, x);
@@ -26,6 +26,11 @@ template <int W> ChainEnergy addForcesTo(const Pack& pack, const double* positio
         // The last segment of an unrolled chain is there for its joint alone.
         if (s < pack.segments)
             Coordinates<W>::template addForces<OnSegments>(pack, s, current, f, included);
+    }
+    if (includeEnergy && twists != NULL && pack.twist.isBentAtRest()) {
+        Real* const own = scratchOfTwists.reserve<Real>(numTwists(pack));
+        gatherTwists<W>(pack, *twists, own);
+        energy.bending += RestBends<W>::findEnergy(pack, x, own);
     }
     if (!pack.propulsions.empty()) {
         gatherSegments<W>(pack, positions, box, x);

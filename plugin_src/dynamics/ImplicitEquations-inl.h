@@ -62,7 +62,7 @@ public:
             if (s > 0)
                 Coordinates<W>::template add<OnJoints>(step, s, factors, previous, current, *before, *here, *after);
             if (isTwisted && s > 0)
-                twist.addStiffness(s, previous, current, *before, *here);
+                twist.addStiffness(s, previous, current, *before, *here, *after);
             if (s < n-2) {
                 describeNew(y, s+1, ahead);
                 Coordinates<W>::describeNew(step, s+1, current, ahead, factorsAhead);

@@ -51,6 +51,12 @@ template <class Real> struct TwistedJoint {
     Real perCosine;
 };
 
+/** What a step keeps of a joint that is bent at rest: see coordinates/RestBends-inl.h. */
+template <class Real> struct RestBend {
+    // Where the first axis of the material is half-way over the joint at the start, and the bend at rest there.
+    Vector<Real> axis, bend;
+};
+
 /** The vector from the point of a tether to its node. */
 struct TetherVector {
     double d[3];
@@ -97,7 +103,7 @@ template <int W> class ImplicitState {
     typedef Vector<Real> Vec;
 public:
     struct Memory {
-        Scratch segments, vectors, tethers, joints, newSegments, gradients, responses;
+        Scratch segments, vectors, tethers, joints, newSegments, gradients, responses, restBends;
     };
     ImplicitState(const Pack& pack, const StepSettings& settings, const StepStart<W>& start, Memory& memory) :
             pack(pack), settings(settings), start(start), n(pack.nodes), h(settings.stepSize), kT(settings.kT),
@@ -111,7 +117,8 @@ public:
             newSegments(memory.newSegments.template reserve<NewSegmentGeometry<Real> >(
                     pack.twist.isPresent() ? n : 0)),
             gradient(memory.gradients.template reserve<Vec>(pack.twist.isHeld ? 3*n : 0)),
-            responsesOfTensions(memory.responses.template reserve<Real>(pack.twist.isHeld ? n : 0)) {
+            responsesOfTensions(memory.responses.template reserve<Real>(pack.twist.isHeld ? n : 0)),
+            restBends(memory.restBends.template reserve<RestBend<Real> >(pack.twist.isBentAtRest() ? n : 0)) {
     }
     const Pack& pack;
     const StepSettings& settings;
@@ -131,6 +138,7 @@ public:
     NewSegmentGeometry<Real>* const newSegments;
     Vec* const gradient;
     Real* const responsesOfTensions;
+    RestBend<Real>* const restBends;
     Stage stage = Stage::Only;
     /** How much of the forces that last for the whole step a stage has. */
     Scalar shareOfForces() const {

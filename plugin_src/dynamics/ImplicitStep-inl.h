@@ -77,6 +77,9 @@ public:
         }
         addPropulsion<W>(step.pack, step.start.segments, step.external);
         stages.describe();
+        if constexpr (HAS_BENDS_AT_REST)
+            if (step.pack.twist.isBentAtRest())
+                RestBends<W>::describe(step);
         if (step.settings.kT > 0)
             noise.draw();
         if (step.pack.twist.isPresent())
@@ -84,8 +87,12 @@ public:
     }
     /** Find by how much twists have changed when nodes have moved by y. */
     void findTwists(const Vec* y, typename DoubleLanes<W>::Type* turned) {
-        if (step.pack.twist.isPresent())
-            twist.findChanges(y, turned);
+        if (!step.pack.twist.isPresent())
+            return;
+        twist.findChanges(y, turned);
+        if constexpr (HAS_BENDS_AT_REST)
+            if (step.pack.twist.isBentAtRest())
+                RestBends<W>::turnFrames(step, y, turned);
     }
     int getNumStages() const {
         return step.twoStages ? 2 : 1;

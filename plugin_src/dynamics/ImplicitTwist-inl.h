@@ -18,16 +18,21 @@
 /** By this much, nodes may give way to the torque that all of a chain shares without its being in their equations. */
 const Scalar NEARLY_RIGID = 0.1;
 
+/** The friction over the step of segments that keep their frames. */
+const Scalar OF_WHAT_DOES_NOT_TURN = 1e30;
+
 template <int W, bool CLOSED> class ImplicitTwist {
     typedef typename Lanes<W>::Type Real;
     typedef Vector<Real> Vec;
+    typedef Matrix<Real> Mat;
     typedef typename DoubleLanes<W>::Type Double;
     static constexpr int REGISTERS = DoubleLanes<W>::REGISTERS;
 public:
     explicit ImplicitTwist(ImplicitState<W>& step) : step(step), pack(step.pack), twist(pack.twist),
-            ofSegments(step), segments(pack.segments), first(CLOSED ? 1 : 0), joints(step.joints),
-            newSegments(step.newSegments) {
-        for (int end = 0; end < 2 && !CLOSED && twist.isPresent(); end++)
+            ofSegments(step), segments(pack.segments), first(CLOSED && !twist.isBentAtRest() ? 1 : 0),
+            joints(step.joints), newSegments(step.newSegments) {
+        const bool hasDirections = twist.isPresent() && (!CLOSED || twist.isBentAtRest());
+        for (int end = 0; end < 2 && hasDirections; end++)
             directions[end] = {loaded<Real>(twist.directions, 3*end), loaded<Real>(twist.directions, 3*end+1),
                     loaded<Real>(twist.directions, 3*end+2)};
         for (int i = 0; i < W && twist.isPresent(); i++)
@@ -43,7 +48,12 @@ public:
             joint.friction = friction*(1/step.h);
             const Real least = lesser<Real>(friction, frictionBefore);
             frictionBefore = friction;
-            const Real theta = larger<Real>(splat<Real>(0.5), 1-least/(4*step.h*stiffness+TINY));
+            Real theta = larger<Real>(splat<Real>(0.5), 1-least/(4*step.h*stiffness+TINY));
+            if (twist.isBentAtRest()) {
+                // Segments turn when nodes have moved: see FrameTurns.h.
+                joint.friction = splat<Real>(OF_WHAT_DOES_NOT_TURN);
+                theta = splat<Real>(0.5);
+            }
             joint.implicit = joint.coupling = stiffness*theta;
             joint.constant = stiffness*step.start.twists[s];
             joint.random = Real{};
@@ -57,7 +67,7 @@ public:
                 turn += letFrameTurn(s, i, end);
             lane(joints[s].constant, i) += twist.torque[end]+lane(joints[s].implicit, i)*turn;
         });
-        if (step.settings.kT > 0)
+        if (step.settings.kT > 0 && !twist.isBentAtRest())
             draw();
         if (step.settings.turnedPairs != NULL)
             addTurnedPairs();
@@ -142,7 +152,7 @@ public:
     }
     /** Add how the torque of a joint changes with the directions of its segments, to the equations of its nodes. */
     template <class Row> CYLCHAIN_INLINE void addStiffness(int s, const NewSegmentGeometry<Real>& geometry1,
-            const NewSegmentGeometry<Real>& geometry2, Row& before, Row& here) const {
+            const NewSegmentGeometry<Real>& geometry2, Row& before, Row& here, Row& after) const {
         const Vec t1 = geometry1.middleTangent, t2 = geometry2.middleTangent;
         // The gradient is that of the middle, which moves half as far.
         const Vec axis = (t1+t2)*(0.25*joints[s].torque*geometry1.middleInverse*geometry2.middleInverse*
@@ -151,6 +161,8 @@ public:
         before.second = before.second-mixed;
         before.upper = before.upper+mixed;
         here.upper = here.upper+mixed;
+        if (twist.isBentAtRest())
+            addOwnStiffness(s, geometry1, geometry2, before, here, after);
     }
     /** Find how the twists have changed when the nodes have moved by y. */
     __attribute__((noinline)) void findChanges(const Vec* y, Double* changes) {
@@ -272,6 +284,19 @@ private:
                 lane(joints[s+1].coupling, i) -= pair.mixed*perTime;
             }
         }
+    }
+    /** Add what a joint whose segments do not turn gives way by. */
+    template <class Row> CYLCHAIN_INLINE void addOwnStiffness(int s, const NewSegmentGeometry<Real>& geometry1,
+            const NewSegmentGeometry<Real>& geometry2, Row& before, Row& here, Row& after) const {
+        const Vec first = joints[s].curvature*-geometry1.middleInverse;
+        const Vec last = joints[s].curvature*geometry2.middleInverse, middle = -(first+last);
+        const Real k = joints[s].implicit;
+        before.diagonal.addOuter(first*k, first);
+        before.upper = before.upper+Mat::outer(first*k, middle);
+        before.second = before.second+Mat::outer(first*k, last);
+        here.diagonal.addOuter(middle*k, middle);
+        here.upper = here.upper+Mat::outer(middle*k, last);
+        after.diagonal.addOuter(last*k, last);
     }
     /** Eliminate the turns of segments, and find how torques respond to a change of all twists. */
     void factorise() {

@@ -63,16 +63,23 @@ void fillTwist(PackTwist<double>& twist, int lanes, int lane, const Chain& chain
         return;
     const ChainTwist& own = chain.twist;
     const size_t segments = chain.segments.size();
-    if (!twist.isPresent())
+    if (!twist.isPresent()) {
         twist = PackTwist<double>(segments, lanes);
+        if (own.isBentAtRest())
+            twist.bends.resize(2*(segments+1)*lanes);
+    }
     for (size_t s = 0; s < segments; s++)
         twist.friction[s*lanes+lane] = own.friction[s];
     for (size_t joint = 0; joint < own.stiffness.size(); joint++) {
         const size_t node = chain.closed && joint == 0 ? segments : chain.closed ? joint : joint+1;
         twist.stiffness[node*lanes+lane] = own.stiffness[joint];
         twist.rest[node*lanes+lane] = own.rest[joint];
+        for (int k = 0; k < 2 && own.isBentAtRest(); k++)
+            twist.bends[(2*node+k)*lanes+lane] = own.bends[2*joint+k];
     }
-    const bool isHeld = chain.closed || (own.ends[0].stiffness > 0 && own.ends[1].stiffness > 0);
+    // Nodes move with segments that do not turn where joints are bent at rest, and share no torque.
+    const bool isHeld = !own.isBentAtRest() &&
+            (chain.closed || (own.ends[0].stiffness > 0 && own.ends[1].stiffness > 0));
     twist.held[lane] = isHeld;
     twist.isHeld |= isHeld;
     for (int end = 0; end < 2 && !chain.closed; end++) {
@@ -90,6 +97,9 @@ void fillTwist(PackTwist<double>& twist, int lanes, int lane, const Chain& chain
         for (int k = 0; k < 3; k++)
             twist.directions[(3*end+k)*lanes+lane] = frame.direction[k];
     }
+    double* const first = &twist.directions[lane];
+    if (own.isBentAtRest() && first[0] == 0 && first[lanes] == 0 && first[2*lanes] == 0)
+        first[2*lanes] = 1;
 }
 
 } // namespace
@@ -106,6 +116,7 @@ bool cylchain::mayShareLanes(const Chain& longest, const Chain& chain, double fi
             (chain.nodeFriction > 0) == (longest.nodeFriction > 0) && chain.bending == longest.bending &&
             chain.stretching == longest.stretching && chain.closed == longest.closed &&
             chain.planar == longest.planar && chain.twist.isPresent() == longest.twist.isPresent() &&
+            chain.twist.isBentAtRest() == longest.twist.isBentAtRest() &&
             chain.segments.size() >= least;
 }
 

@@ -100,7 +100,7 @@ template <int W, bool CLOSED> void findSweptAreas(const Pack& pack, const StepSt
         for (int i = 0; i < LANE_COUNT<Real>; i++)
             lane(own, i) = pack.segmentsOfLane[part*LANE_COUNT<Real>+i];
         Swept ends[2] = {};
-        for (int end = 0; end < 2 && !CLOSED; end++) {
+        for (int end = 0; end < 2; end++) {
             const std::vector<double>& directions = pack.twist.directions;
             ends[end] = {{loadedPart(directions, 3*end), loadedPart(directions, 3*end+1),
                     loadedPart(directions, 3*end+2)}, splat<Real>(1)};
@@ -133,7 +133,8 @@ template <int W, bool CLOSED> void findSweptAreas(const Pack& pack, const StepSt
                 b = withEnd(s, withLength(vector+(moved-before)));
                 newB = withEnd(s, withLength(vector+(newMoved-newBefore)));
             }
-            areas[s*REGISTERS+part] = CLOSED && s == 0 ? Real{} : sweptArea<Real>(a, b, newA, newB);
+            const bool isJoint = !CLOSED || s > 0 || pack.twist.isBentAtRest();
+            areas[s*REGISTERS+part] = isJoint ? sweptArea<Real>(a, b, newA, newB) : Real{};
             a = b;
             newA = newB;
         }

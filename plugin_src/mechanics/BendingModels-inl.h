@@ -211,6 +211,12 @@ inline double bendMeasure(BendingModel model, double square) {
 #undef CYLCHAIN_FORMULA
 }
 
+/** Minus twice the slope of the logarithm of bendMeasure() over the square of the bend. */
+inline double slopeOfBendMeasure(BendingModel model, double square) {
+    const double small = 1e-4, least = square > small ? square-small : 0;
+    return -2*std::log(bendMeasure(model, square+small)/bendMeasure(model, least))/(square+small-least);
+}
+
 inline double leastBendSquare(BendingModel model) {
 #define CYLCHAIN_FORMULA LEAST_SQUARE
     CYLCHAIN_DISPATCH

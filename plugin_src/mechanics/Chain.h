@@ -62,7 +62,7 @@ struct Chain {
     double start = 0;
     ChainTwist twist;
     int numTwists() const {
-        return twist.isPresent() ? segments.size()+(closed ? 0 : 1) : 0;
+        return twist.isPresent() ? segments.size()+(closed && !twist.isBentAtRest() ? 0 : 1) : 0;
     }
     int numNodes() const {
         return nodes.size();

@@ -23,16 +23,29 @@ struct EndFrame {
  * its energy is (stiffness/2) (m-rest)^2.
  *
  * Twists are numbered by the node before their segment, as joints of closed chains are: that of an open chain with N
- * segments number 0 and N are those to the frames of its ends.
+ * segments number 0 and N are those to the frames of its ends. With bends at rest, the frame of the first segment is
+ * state, too: it is the vector that orthogonal() finds for the direction beyond the first end, carried over by parallel
+ * transport, and turned by the twist number 0. Where there is no such direction, it is the z axis; and closed chains,
+ * whose joints are N, have that twist as one more, number N.
  */
 struct ChainTwist {
     /** Of each joint. */
     std::vector<double> stiffness, rest;
+    /**
+     * Bends at rest: for each joint, the two components of R k in the material frame half-way over the joint, where
+     * its energy of bending is that of the vector b-R k in place of its bend b; none if all joints are straight at
+     * rest. The frame half-way is that of the segment before, carried over to the bisector by parallel transport, and
+     * turned by half of the twist m.
+     */
+    std::vector<double> bends;
     /** Of each segment; none if the chain has no twist. */
     std::vector<double> friction;
     EndFrame ends[2];
     bool isPresent() const {
         return !friction.empty();
+    }
+    bool isBentAtRest() const {
+        return !bends.empty();
     }
 };
 

@@ -214,11 +214,12 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         std::vector<double>& parameters, std::vector<double>& places, std::vector<double>& gaps,
         std::vector<double>& forces, std::vector<double>& sums, std::vector<double>& loads,
         std::vector<double>& rotationalFriction, std::vector<double>& stiffness, std::vector<double>& rest,
-        std::vector<double>& friction, std::vector<double>& twists};
+        std::vector<double>& friction, std::vector<double>& bends, std::vector<double>& twists};
 %apply const std::vector<double>& fractions {const std::vector<double>& points,
         const std::vector<double>& parameters, const std::vector<double>& places, const std::vector<double>& loads,
         const std::vector<double>& rotationalFriction, const std::vector<double>& stiffness,
-        const std::vector<double>& rest, const std::vector<double>& friction, const std::vector<double>& twists};
+        const std::vector<double>& rest, const std::vector<double>& friction, const std::vector<double>& bends,
+        const std::vector<double>& twists};
 
 %typemap(in, numinputs=0) std::vector<Vec3>& vectors (std::vector<OpenMM::Vec3> value) {
     $1 = &value;

@@ -18,7 +18,6 @@ from openmm_cylchain import (
     InstabilityError,
     TwistWarning,
     analysis,
-    capsule_contact_force,
     check_time_step,
     theory,
 )
@@ -29,60 +28,22 @@ from support.contexts import new_context, positions_of
 from support.ring_monte_carlo import RingMonteCarlo, regular_rings
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 from support.supercoil_monte_carlo import SupercoiledRing, writhes_of_polygons
+from support.twisted_chains import (
+    CHAIN,
+    DNA,
+    LENGTH,
+    NANOSECOND,
+    SIGMAS,
+    UNTWISTED,
+    assert_near,
+    in_context,
+    mean_and_error,
+    mean_square_angle_of_an_end,
+)
 
-SIGMAS = 4.0
-LENGTH = 5.0
-CHAIN = {
-    "name": "DNA",
-    "diameter": 2.0,
-    "segment_length": LENGTH,
-    "bending_rigidity": 50.0 * KT,
-    "stretching_modulus": 4000.0 * KT,
-    "bending_model": "kratky-porod",
-}
-DNA = FilamentType(torsional_rigidity=100.0 * KT, **CHAIN)
 # Of B-DNA, with 10.5 base pairs of 0.34 nm in a turn.
 INTRINSIC = 2 * np.pi / 3.57
 HELIX = replace(DNA, intrinsic_twist=INTRINSIC)
-UNTWISTED = FilamentType(**CHAIN)
-END = 4.0 * KT
-NANOSECOND = 1e3
-
-
-def in_context(
-    filaments,
-    step,
-    pull=None,
-    seed=1,
-    platform="CPU",
-    contacts=False,
-    level=0,
-    force=None,
-    precision="automatic",
-    links=None,
-):
-    """A Context of filaments, which constant forces pull along z, and a FilamentsInContext.
-
-    Stronger ones hold the last segment along z, where a frame may be. The level is that of the Brownian path.
-    """
-    _, system, positions = filaments.build()
-    if force is not None:
-        system.addForce(force)
-    if links is not None:
-        links.add_to(system)
-    if pull is not None:
-        force = openmm.CustomExternalForce("-pull*z")
-        force.addPerParticleParameter("pull")
-        for nodes in filaments.node_indices:
-            force.addParticle(int(nodes[-1]), [max(pull, END)])
-            force.addParticle(int(nodes[-2]), [pull - max(pull, END)])
-        system.addForce(force)
-    if contacts:
-        system.addForce(capsule_contact_force(filaments, system, 2.0))
-    integrator = filaments.create_integrator(system, step, random_seed=seed, checks=False, precision=precision)
-    integrator.setPathLevel(level)
-    context = new_context(system, positions, integrator, platform)
-    return context, filaments.in_context(context)
 
 
 def held_chains(chains, segments, torque=None, kind=DNA):
@@ -94,18 +55,6 @@ def held_chains(chains, segments, torque=None, kind=DNA):
             filaments.add_end_frame(number, "minus", [0, 0, 2.0])
             filaments.add_end_frame(number, "plus", [0, 0, 1.0], torque=torque)
     return filaments
-
-
-def mean_and_error(samples):
-    """Of samples (times, filaments), which are independent from filament to filament."""
-    of_filaments = np.mean(samples, axis=0)
-    return of_filaments.mean(), of_filaments.std(ddof=1) / np.sqrt(len(of_filaments))
-
-
-def assert_near(samples, exact, error=0.05):
-    mean, deviation = mean_and_error(np.array(samples))
-    assert SIGMAS * deviation < error * abs(exact), "too few samples to tell"
-    assert mean == pytest.approx(exact, abs=SIGMAS * deviation)
 
 
 # What is given
@@ -556,16 +505,6 @@ def test_material_frames_of_free_chains(step):
         assert mean == pytest.approx(exact, abs=allowed + SIGMAS * error), (name, joints)
         # Along ten joints, directions are a third of what they were, and cannot be told.
         assert (name, joints) == ("along", 10) or SIGMAS * error < 0.03 * twisted, (name, joints)
-
-
-def mean_square_angle_of_an_end(segments, time):
-    """By which an end of a straight chain turns: of its discrete Rouse modes, and of the whole."""
-    friction, stiffness = DNA.axial_friction(VISCOSITY), DNA.twist_stiffness
-    joints = np.diff(np.eye(segments), axis=0)
-    values, modes = np.linalg.eigh(stiffness * joints.T @ joints)
-    own = values[1:], modes[0, 1:] ** 2
-    whole = 2 * KT * time / (friction * segments)
-    return whole + np.sum(own[1] * 2 * KT / own[0] * (1 - np.exp(-own[0] * time / friction)))
 
 
 @pytest.mark.parametrize("step", [1e3, 1e2, pytest.param(1e1, marks=pytest.mark.slow)])

@@ -8,10 +8,11 @@ import numpy as np
 from ...errors import InputError
 from ...filaments.chain_type import ChainType
 from ...filaments.growth import Growth, check_growth
+from ...filaments.rest_bends import RestBends, check_rest_bends
 from ...filaments.shapes import MINIMUM_RING
 from ...kinetics.nucleation import Nucleation
 from ...units import quantities as units
-from ..keys import Choice, Either, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
+from ..keys import REQUIRED, Choice, Either, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
 from ..start_files import read_start
 from ..table import ACTIVE, TableKind
 from .deletion import CUT, CUT_EXAMPLE, DELETE, DELETE_EXAMPLE, Deletion, read_cuts, read_deletion
@@ -47,6 +48,22 @@ _FROM_NODES = (
     "height",
 )
 _FROM_FILE = (*_FROM_NODES[:-1], "tangents")
+
+_REST_BENDS_EXAMPLE = '{ angles = ["10 deg"], directions = ["0 deg"] }'
+_REST_BENDS = TableKind(
+    "rest_bends",
+    (
+        Key("angles", Listing(Quantity(units.ANGLE, "zero"), "angles", '["10 deg"]'), REQUIRED, "One, or one of each."),
+        Key(
+            "directions",
+            Listing(Quantity(units.ANGLE, "any"), "angles", '["0 deg"]'),
+            (0.0,),
+            "Where to in the material frame; one, or one of each.",
+        ),
+    ),
+    "By how much the joints of filaments with twist are bent at rest, see `RestBends`.",
+    owner="rest_bends of [[filament]]",
+)
 
 CONTACT_KEYS = (
     Key(
@@ -137,6 +154,12 @@ FILAMENT = TableKind(
             "Force that propels it: on each segment along its tangent, or on each beam element along its curve.",
         ),
         Key(
+            "rest_bends",
+            Inline(_REST_BENDS, _REST_BENDS_EXAMPLE),
+            None,
+            "By how much joints of filaments with twist are bent at rest: curved DNA.",
+        ),
+        Key(
             "growth",
             Inline(GROWTH, GROWTH_EXAMPLE),
             None,
@@ -215,6 +238,7 @@ class FilamentGroup:
     nucleation: Nucleation | None = dataclasses.field(default=None, compare=False)
     on_body: bool = False
     contact_diameter: float | None = None
+    rest_bends: RestBends | None = None
 
     @property
     def path(self):
@@ -285,9 +309,21 @@ def read_filaments(entries, table, solvent, box, folder, monomers, contacts):
         spare = 0
         if growth is not None:
             spare = _spare_nodes(entries, growth, kind, group.segments, group.closed, clamped)
-        held = {"clamped": clamped, "clamped_tangents": tangents}
+        bends = _rest_bends(entries, kind, group)
+        held = {"clamped": clamped, "clamped_tangents": tangents, "rest_bends": bends}
         finished.append(dataclasses.replace(group, **held, growth=growth, spare_nodes=spare, **own, **common))
     return finished
+
+
+def _rest_bends(entries, kind, group):
+    if entries["rest_bends"] is None:
+        return None
+    own, label = entries["rest_bends"], entries.label.rstrip(":")
+    with entries.naming():
+        angles, directions = (own[key][0] if len(own[key]) == 1 else own[key] for key in ("angles", "directions"))
+        bends = RestBends(angles, directions)
+        check_rest_bends(bends, kind, group.joints, bool(entries["planar"]), entries["growth"] is not None, label)
+    return bends
 
 
 def read_contact_diameter(entries, kind, contacts):

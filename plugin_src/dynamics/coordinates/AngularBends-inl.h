@@ -1,24 +1,5 @@
 // Included into the namespace of an instruction set. It does not compile alone.
 
-/**
- * A bend is drawn as a Gaussian with rejection if the joint is stiffer than this many k_B T, or else from the sphere.
- */
-const Scalar STIFF_JOINT = 2;
-
-/**
- * Two vectors that are orthogonal to a unit vector and to each other (Duff et al., J. Comput. Graph. Tech. 2017, 6, 1).
- */
-template <class Real> CYLCHAIN_INLINE void orthogonal(const Vector<Real>& n, Vector<Real>& first,
-        Vector<Real>& second) {
-    Real sign;
-    Vector<Real> copy = n;
-    for (int i = 0; i < LANE_COUNT<Real>; i++)
-        lane(sign, i) = std::copysign(1.0, lane(copy.z, i));
-    const Real a = -1/(sign+n.z), b = n.x*n.y*a;
-    first = {1+sign*n.x*n.x*a, sign*b, -sign*n.x};
-    second = {b, sign+n.y*n.y*a, -n.y};
-}
-
 /** Bends b = f (t2-t1) of the tangents of segments, with the angular bending models. */
 template <int W> struct AngularBends : OnJoints {
     typedef typename Lanes<W>::Type Real;
@@ -47,7 +28,9 @@ template <int W> struct AngularBends : OnJoints {
         segment.jointTheta = larger<Real>(splat<Real>(0.5), 1-friction/bendRate);
     }
     static void draw(const State& step, const NoisePlaces<W>& places, const PlaceNormals<Real>&, int s) {
-        if (step.pack.planar)
+        if (HAS_BENDS_AT_REST && step.pack.twist.isBentAtRest())
+            RestBends<W>::draw(step, places, s);
+        else if (step.pack.planar)
             drawPlanar(step, places, s);
         else
             drawInSpace(step, places, s);
@@ -89,8 +72,13 @@ template <int W> struct AngularBends : OnJoints {
         const Vec bisector = joint.sum*joint.perSum;
         const Real cosine = joint.projection*joint.perSum;
         const Vec axis = crossProduct(segment.bisector, bisector);
-        const Vec turned = segment.turningBend*cosine+crossProduct(axis, segment.turningBend)+
-                axis*(axis.dot(segment.turningBend)*sumLength*perOne);
+        const auto turnedWithJoint = [&] (const Vec& vector) {
+            return vector*cosine+crossProduct(axis, vector)+axis*(axis.dot(vector)*sumLength*perOne);
+        };
+        Vec turned = turnedWithJoint(segment.turningBend);
+        if (HAS_BENDS_AT_REST && step.pack.twist.isBentAtRest())
+            turned = turned+RestBends<W>::inForce(step, s, geometry1, geometry2, bisector,
+                    turnedWithJoint(step.restBends[s].bend));
         const Vec newBend = newBent*newFactor.f;
 
         const Real stiffness = property<Real>(step.pack, s, Pack::Joint);

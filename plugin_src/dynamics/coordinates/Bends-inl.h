@@ -1,6 +1,11 @@
 // Included into the namespace of an instruction set. It does not compile alone.
 
 /**
+ * A bend is drawn as a Gaussian with rejection if the joint is stiffer than this many k_B T, or else from the sphere.
+ */
+const Scalar STIFF_JOINT = 2;
+
+/**
  * What a stage makes of a bend of any kind.
  *
  * @param ofFirst   gives the part that the second stage has of the bend at the end of the first

@@ -13,6 +13,7 @@
 
 #include "dynamics/coordinates/Lengths-inl.h"
 #include "dynamics/coordinates/Bends-inl.h"
+#include "dynamics/coordinates/RestBends-inl.h"
 #include "dynamics/coordinates/AngularBends-inl.h"
 #include "dynamics/coordinates/LinearBends-inl.h"
 #include "dynamics/coordinates/Tethers-inl.h"

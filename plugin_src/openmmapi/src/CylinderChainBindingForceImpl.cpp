@@ -284,6 +284,9 @@ void CylinderChainBindingForceImpl::checkHelices(const cylchain::ChainList& chai
             require(chains.getKind(chain) == cylchain::ChainKind::StraightSegments &&
                     chains.getChain(chain).twist.isPresent(), "Hand "+to_string(i)+" follows the helix of "+
                     chains.getNameInSentence(chain)+", which has no twist");
+        for (int chain : hand.chains)
+            require(!chains.getChain(chain).twist.isBentAtRest(), "Hand "+to_string(i)+" follows the helix of "+
+                    chains.getNameInSentence(chain)+", which has bends at rest, and cannot be turned as yet");
     }
     for (ForceImpl* impl : context->getForceImpls())
         if (anyOnHelix && dynamic_cast<CylinderChainForceImpl*>(impl) != NULL)

@@ -37,6 +37,9 @@ static void checkTwist(const cylchain::ChainList& chains) {
             throw OpenMMException("CylinderChainForce: "+name+" is planar, and cannot have twist");
         if (chain.nodeFriction > 0 || !cylchain::isAngular(chain.bending))
             throw OpenMMException("CylinderChainForce: "+name+" is a chain of beads, and cannot have twist");
+        if (chain.twist.isBentAtRest() && chain.twist.ends[0].angularVelocity != 0)
+            throw OpenMMException("CylinderChainForce: "+name+" has bends at rest, which turn with the frame of its "
+                    "first segment: turn the frame beyond its other end");
     }
 }
 
@@ -95,6 +98,8 @@ vector<bool> findSpareNodes(const System& system) {
 static void refuseOtherModels(const cylchain::Chain& present, const cylchain::Chain& old) {
     if (present.twist.isPresent() != old.twist.isPresent())
         throw OpenMMException("updateParametersInContext: Whether a chain has twist has changed");
+    if (present.twist.isBentAtRest() != old.twist.isBentAtRest())
+        throw OpenMMException("updateParametersInContext: Whether a chain has bends at rest has changed");
     if (present.bending != old.bending || present.stretching != old.stretching)
         throw OpenMMException("updateParametersInContext: The models of a chain have changed");
 }

@@ -286,6 +286,9 @@ void CylinderChainForce::setSegmentPropulsion(int chain, int segment, double pro
     getChain(chain).segments[segment].propulsion = propulsion;
 }
 
+/** Of joints; segments may turn by less than a right angle in a step. */
+static const double LARGEST_REST_BEND = 1.0;
+
 void CylinderChainForce::setChainTwist(int chain, const vector<double>& stiffness, const vector<double>& rest,
         const vector<double>& friction) {
     cylchain::Chain& own = getChain(chain);
@@ -318,6 +321,25 @@ void CylinderChainForce::getChainTwist(int chain, vector<double>& stiffness, vec
     stiffness = twist.stiffness;
     rest = twist.rest;
     friction = twist.friction;
+}
+
+void CylinderChainForce::setChainRestBends(int chain, const vector<double>& bends) {
+    cylchain::Chain& own = getChain(chain);
+    if (!own.twist.isPresent() && !bends.empty())
+        throw OpenMMException("CylinderChainForce: Bends at rest are those of frames, which chains without twist lack");
+    if (!bends.empty() && bends.size() != 2*own.joints.size())
+        throw OpenMMException("CylinderChainForce: Bends at rest need two components of each joint");
+    for (size_t joint = 0; 2*joint < bends.size(); joint++) {
+        const double size = hypot(bends[2*joint], bends[2*joint+1]);
+        if (!(size <= LARGEST_REST_BEND))
+            throw OpenMMException("CylinderChainForce: The bend of a joint at rest must be finite, and not exceed "+
+                    to_string(LARGEST_REST_BEND));
+    }
+    own.twist.bends = bends;
+}
+
+void CylinderChainForce::getChainRestBends(int chain, vector<double>& bends) const {
+    bends = getChain(chain).twist.bends;
 }
 
 static void checkEnd(const cylchain::Chain& chain, int end) {

@@ -107,9 +107,16 @@ void CylinderChainForceImpl::updateContextState(ContextImpl& context, bool&) {
 
 double CylinderChainForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy,
         int groups) {
-    if (isIn(groups) && !isExcluded())
-        return kernel.getAs<CalcCylinderChainForceKernel>().execute(context, includeForces, includeEnergy);
-    return 0.0;
+    if (!isIn(groups) || isExcluded())
+        return 0.0;
+    const vector<cylchain::Chain>& chains = description->getChains();
+    for (size_t i = 0; i < chains.size() && includeForces; i++)
+        if (chains[i].twist.isBentAtRest())
+            throw OpenMMException("CylinderChainForce: "+description->getList().getName(
+                    description->getList().getNumber(cylchain::ChainKind::StraightSegments, i))+" has bends at rest. "
+                    "Frames go along with its nodes in steps of a CylinderChainIntegrator alone: there are energies, "
+                    "but no forces, outside of these");
+    return kernel.getAs<CalcCylinderChainForceKernel>().execute(context, includeForces, includeEnergy, twists);
 }
 
 vector<string> CylinderChainForceImpl::getKernelNames() {
@@ -144,5 +151,5 @@ void CylinderChainForceImpl::haveGrown(ContextImpl& context, const vector<int>& 
 }
 
 void CylinderChainForceImpl::computeEnergies(ContextImpl& context, double& stretching, double& bending) {
-    kernel.getAs<CalcCylinderChainForceKernel>().computeEnergies(context, stretching, bending);
+    kernel.getAs<CalcCylinderChainForceKernel>().computeEnergies(context, twists, stretching, bending);
 }

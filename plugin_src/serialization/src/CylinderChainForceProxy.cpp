@@ -25,6 +25,9 @@ static void writeTwist(SerializationNode& node, const ChainTwist& twist) {
     for (size_t i = 0; i < twist.stiffness.size(); i++)
         joints.createChildNode("Joint").setDoubleProperty("stiffness", twist.stiffness[i])
                 .setDoubleProperty("rest", twist.rest[i]);
+    for (size_t i = 0; i < twist.bends.size(); i += 2)
+        joints.getChildren()[i/2].setDoubleProperty("bendX", twist.bends[i])
+                .setDoubleProperty("bendY", twist.bends[i+1]);
     SerializationNode& segments = node.createChildNode("Segments");
     for (double friction : twist.friction)
         segments.createChildNode("Segment").setDoubleProperty("friction", friction);
@@ -38,14 +41,18 @@ static void writeTwist(SerializationNode& node, const ChainTwist& twist) {
 }
 
 static void readTwist(const SerializationNode& node, CylinderChainForce& force, int chain) {
-    vector<double> stiffness, rest, friction;
+    vector<double> stiffness, rest, friction, bends;
     for (auto& joint : node.getChildNode("Joints").getChildren()) {
+        for (const char* component : {"bendX", "bendY"})
+            if (joint.hasProperty(component))
+                bends.push_back(joint.getDoubleProperty(component));
         stiffness.push_back(joint.getDoubleProperty("stiffness"));
         rest.push_back(joint.getDoubleProperty("rest"));
     }
     for (auto& segment : node.getChildNode("Segments").getChildren())
         friction.push_back(segment.getDoubleProperty("friction"));
     force.setChainTwist(chain, stiffness, rest, friction);
+    force.setChainRestBends(chain, bends);
     int end = 0;
     for (auto& frame : node.getChildNode("Ends").getChildren()) {
         if (!force.isChainClosed(chain))

@@ -248,7 +248,8 @@ public:
      * Let the segments of a chain of straight segments have material frames, and its joints an energy of twist,
      * (stiffness/2) (m-rest)^2: mechanics/ChainTwist.h says what the twist m is.  CylinderChainIntegrator moves such a
      * chain with the scheme Implicit.  Twists are state of a Context, see getTwists(), and no function of positions:
-     * energies and forces of a Context are without them.  The chain is not planar, and its nodes have no friction.
+     * energies and forces of a Context are without those of twist.  The chain is not planar, and its nodes have no
+     * friction.
      *
      * @param chain      the index of the chain
      * @param stiffness  the stiffness of each joint, measured in kJ/mol: the torsional rigidity divided by the rest
@@ -264,6 +265,23 @@ public:
      */
     void getChainTwist(int chain, std::vector<double>& stiffness, std::vector<double>& rest,
             std::vector<double>& friction) const;
+    /**
+     * Let the joints of a chain with twist be bent at rest: their bending energy is that of the vector b-R k in place of
+     * the bend b, where R k is a vector of the material.  mechanics/ChainTwist.h says of which frame.  The frame of the
+     * first segment is state then: it is in the first twist of an open chain, and in one more, the last, of a closed
+     * one.  Segments turn when nodes have moved.  The energy of a Context is that for its twists; there are no forces
+     * outside of steps.
+     *
+     * @param chain  the index of the chain, which has twist
+     * @param bends  two components of each joint in the material frame half-way over it; none if all joints are
+     *               straight.  They have the size of b: the square root of twice the energy of the model for the angle
+     *               at rest and the stiffness one.
+     */
+    void setChainRestBends(int chain, const std::vector<double>& bends);
+    /**
+     * Get what was set by setChainRestBends().
+     */
+    void getChainRestBends(int chain, std::vector<double>& bends) const;
     /**
      * Set the frame beyond an end of an open chain with twist.  A frame whose joint has a stiffness is held, or turns
      * against a friction of its own, as a bead does; one without turns with the last segment.  An end is free unless

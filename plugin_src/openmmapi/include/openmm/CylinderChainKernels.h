@@ -49,17 +49,21 @@ public:
      * @param context        the context in which to execute this kernel
      * @param includeForces  true if forces should be calculated
      * @param includeEnergy  true if the energy should be calculated
+     * @param twists         those of each chain of straight segments
      * @return the potential energy due to the force
      */
-    virtual double execute(ContextImpl& context, bool includeForces, bool includeEnergy) = 0;
+    virtual double execute(ContextImpl& context, bool includeForces, bool includeEnergy,
+            const std::vector<std::vector<double> >& twists) = 0;
     /**
      * Calculate the energies of stretching and bending separately.
      *
      * @param context          the context in which to execute this kernel
+     * @param twists           those of each chain of straight segments
      * @param[out] stretching  the stretching energy of all segments
      * @param[out] bending     the bending energy of all joints
      */
-    virtual void computeEnergies(ContextImpl& context, double& stretching, double& bending) = 0;
+    virtual void computeEnergies(ContextImpl& context, const std::vector<std::vector<double> >& twists,
+            double& stretching, double& bending) = 0;
     /**
      * Take over the parameters of the chains, which have changed.
      *

@@ -19,8 +19,10 @@ public:
     ReferenceCalcCylinderChainForceKernel(std::string name, const Platform& platform,
             std::shared_ptr<HostParticles> particles);
     void initialize(const System& system, const CylinderChainDescription& chains);
-    double execute(ContextImpl& context, bool includeForces, bool includeEnergy);
-    void computeEnergies(ContextImpl& context, double& stretching, double& bending);
+    double execute(ContextImpl& context, bool includeForces, bool includeEnergy,
+            const std::vector<std::vector<double> >& twists);
+    void computeEnergies(ContextImpl& context, const std::vector<std::vector<double> >& twists, double& stretching,
+            double& bending);
     void copyParametersToContext(ContextImpl& context);
     void replaceChains(ContextImpl& context, const std::vector<int>& changed);
     std::vector<int> getArrangement();
@@ -68,7 +70,8 @@ public:
     const double* getBox() const;
 private:
     void createEngines();
-    cylchain::ChainEnergy addForces(std::vector<Vec3>& forces, bool includeEnergy);
+    cylchain::ChainEnergy addForces(std::vector<Vec3>& forces, bool includeEnergy,
+            const std::vector<std::vector<double> >& twists);
     std::shared_ptr<HostParticles> particles;
     const CylinderChainDescription* chains;
     std::unique_ptr<cylchain::ChainEngine> engine;

@@ -38,13 +38,15 @@ const double* ReferenceCalcCylinderChainForceKernel::getBox() const {
     return chains->usesPeriodicBoundaryConditions() ? &particles->getBox()[0][0] : NULL;
 }
 
-ChainEnergy ReferenceCalcCylinderChainForceKernel::addForces(vector<Vec3>& forces, bool includeEnergy) {
+ChainEnergy ReferenceCalcCylinderChainForceKernel::addForces(vector<Vec3>& forces, bool includeEnergy,
+        const vector<vector<double> >& twists) {
     const double* positions = &particles->getPositions()[0][0];
     const double* box = getBox();
     const int numPacks = engine->getNumPacks();
     vector<ChainEnergy> energies(numPacks+beamEngine->getNumPacks());
     particles->getLoop().run(energies.size(), [&] (int pack) {
-        energies[pack] = pack < numPacks ? engine->addForces(pack, positions, &forces[0][0], box, includeEnergy) :
+        energies[pack] = pack < numPacks ? engine->addForces(pack, positions, &forces[0][0], box, includeEnergy,
+                &twists) :
                 beamEngine->addForces(pack-numPacks, positions, &forces[0][0], box, includeEnergy);
     });
 
@@ -59,21 +61,23 @@ ChainEnergy ReferenceCalcCylinderChainForceKernel::addForces(vector<Vec3>& force
     return total;
 }
 
-double ReferenceCalcCylinderChainForceKernel::execute(ContextImpl& context, bool includeForces, bool includeEnergy) {
+double ReferenceCalcCylinderChainForceKernel::execute(ContextImpl& context, bool includeForces, bool includeEnergy,
+        const vector<vector<double> >& twists) {
     particles->update();
     vector<Vec3> unused;
     if (!includeForces)
         unused.resize(context.getSystem().getNumParticles());
-    const ChainEnergy energy = addForces(includeForces ? particles->beginForces() : unused, includeEnergy);
+    const ChainEnergy energy = addForces(includeForces ? particles->beginForces() : unused, includeEnergy, twists);
     if (includeForces)
         particles->endForces();
     return energy.stretching+energy.bending+energy.tethers;
 }
 
-void ReferenceCalcCylinderChainForceKernel::computeEnergies(ContextImpl& context, double& stretching, double& bending) {
+void ReferenceCalcCylinderChainForceKernel::computeEnergies(ContextImpl& context,
+        const vector<vector<double> >& twists, double& stretching, double& bending) {
     particles->update();
     vector<Vec3> unused(context.getSystem().getNumParticles());
-    const ChainEnergy energy = addForces(unused, true);
+    const ChainEnergy energy = addForces(unused, true, twists);
     stretching = energy.stretching;
     bending = energy.bending;
 }

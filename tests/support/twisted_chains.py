@@ -1,0 +1,82 @@
+"""Chains with twist in a Context, and averages over them beside exact ones."""
+
+import numpy as np
+import openmm
+import pytest
+
+from openmm_cylchain import FilamentType, capsule_contact_force
+from support.contexts import new_context
+from support.solvent import KT, VISCOSITY
+
+SIGMAS = 4.0
+LENGTH = 5.0
+CHAIN = {
+    "name": "DNA",
+    "diameter": 2.0,
+    "segment_length": LENGTH,
+    "bending_rigidity": 50.0 * KT,
+    "stretching_modulus": 4000.0 * KT,
+    "bending_model": "kratky-porod",
+}
+DNA = FilamentType(torsional_rigidity=100.0 * KT, **CHAIN)
+UNTWISTED = FilamentType(**CHAIN)
+END = 4.0 * KT
+NANOSECOND = 1e3
+
+
+def in_context(
+    filaments,
+    step,
+    pull=None,
+    seed=1,
+    platform="CPU",
+    contacts=False,
+    level=0,
+    force=None,
+    precision="automatic",
+    links=None,
+):
+    """A Context of filaments, which constant forces pull along z, and a FilamentsInContext.
+
+    Stronger ones hold the last segment along z, where a frame may be. The level is that of the Brownian path.
+    """
+    _, system, positions = filaments.build()
+    if force is not None:
+        system.addForce(force)
+    if links is not None:
+        links.add_to(system)
+    if pull is not None:
+        force = openmm.CustomExternalForce("-pull*z")
+        force.addPerParticleParameter("pull")
+        for nodes in filaments.node_indices:
+            force.addParticle(int(nodes[-1]), [max(pull, END)])
+            force.addParticle(int(nodes[-2]), [pull - max(pull, END)])
+        system.addForce(force)
+    if contacts:
+        system.addForce(capsule_contact_force(filaments, system, 2.0))
+    integrator = filaments.create_integrator(system, step, random_seed=seed, checks=False, precision=precision)
+    integrator.setPathLevel(level)
+    context = new_context(system, positions, integrator, platform)
+    return context, filaments.in_context(context)
+
+
+def mean_and_error(samples):
+    """Of samples (times, filaments), which are independent from filament to filament."""
+    of_filaments = np.mean(samples, axis=0)
+    return of_filaments.mean(), of_filaments.std(ddof=1) / np.sqrt(len(of_filaments))
+
+
+def assert_near(samples, exact, error=0.05):
+    mean, deviation = mean_and_error(np.array(samples))
+    assert SIGMAS * deviation < error * abs(exact), "too few samples to tell"
+    assert mean == pytest.approx(exact, abs=SIGMAS * deviation)
+
+
+def mean_square_angle_of_an_end(segments, time):
+    """By which an end of a straight chain turns: of its discrete Rouse modes, and of the whole."""
+    friction, stiffness = DNA.axial_friction(VISCOSITY), DNA.twist_stiffness
+    joints = np.diff(np.eye(segments), axis=0)
+    values, modes = np.linalg.eigh(stiffness * joints.T @ joints)
+    own = values[1:], modes[0, 1:] ** 2
+    whole = 2 * KT * time / (friction * segments)
+    return whole + np.sum(own[1] * 2 * KT / own[0] * (1 - np.exp(-own[0] * time / friction)))
