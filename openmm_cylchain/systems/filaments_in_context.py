@@ -384,7 +384,10 @@ class FilamentsInContext:
             length = 1e3 * own.segments * own.type.segment_length
             ends = [length * np.array(frames[end].direction) for end in FILAMENT_ENDS]
             nodes = np.vstack([nodes[0] - ends[0], nodes, nodes[-1] + ends[1]])
-        return float(twists_of(self._context, number).sum()) / (2.0 * np.pi) + writhe(nodes, own.closed)
+        twists = twists_of(self._context, number)
+        # Rings that are bent at rest have one more, which is that of no joint.
+        turned = twists[: own.segments] if own.closed else twists
+        return float(turned.sum()) / (2.0 * np.pi) + writhe(nodes, own.closed)
 
     def set_twists(self, filament: int, twists: npt.ArrayLike) -> None:
         """Give a filament other twists, such as those of another run, or of a ring that is closed with some turns.

@@ -205,8 +205,8 @@ class Probe:
     def _measure_twist(self, kind, context):
         own = self._filaments.in_context(context)
         twists = np.array([own.twists(number)._value for number in kind.numbers])
-        if not kind.filament.closed:
-            twists = twists[:, 1:-1]
+        # Without those to frames of ends, or of the first frame of a ring.
+        twists = twists[:, : kind.filament.segments] if kind.filament.closed else twists[:, 1:-1]
         twists = twists - kind.filament.type.rest_twist
         energies = 0.5 * kind.filament.type.twist_stiffness * np.sum(twists**2, axis=1) / max(1, twists.shape[1])
         return [energies / self._kT, np.sum(twists, axis=1) ** 2]

@@ -49,6 +49,14 @@ template <int W> struct RestBends {
     /** By how much the energy of bends is that of bends at rest, for nodes and twists. */
     static double findEnergy(const Pack& pack, const Vec* nodes, const Real* twists);
 private:
+    /**
+     * Draw a bend of a lane from its equilibrium.
+     *
+     * @param k     the stiffness over k_B T
+     * @param bend  two normal numbers, which become the bend
+     */
+    static void drawBend(const State& step, int s, int i, double k, const double* rest, double acceptance,
+            double* bend);
     /** The energy of a joint between tangents over that of b-R k for R k = 0, as a function of how it is turned. */
     static CYLCHAIN_INLINE void findTurnedEnergy(const Pack& pack, int s, const Vec& before, const Vec& tangent,
             const Vec& bisector, const Vec& rest, Real& cosine, Real& sine) {
@@ -67,49 +75,53 @@ private:
 template <int W> void RestBends<W>::draw(const State& step, const NoisePlaces<W>& places, int s) {
     const Pack& pack = step.pack;
     ImplicitSegment<Real>& segment = step.segments[s];
-    const NoiseKey key = noiseKey(step.settings);
     Real stiffness = property<Real>(pack, s, Pack::Joint)/step.kT, theta = segment.jointTheta;
-    Real ofRest[2] = {loaded<Real>(pack.twist.bends, 2*s), loaded<Real>(pack.twist.bends, 2*s+1)};
+    Real rest[2] = {loaded<Real>(pack.twist.bends, 2*s), loaded<Real>(pack.twist.bends, 2*s+1)};
     Real normals[2], acceptance;
-    drawCandidates<W>(key, NoiseKind::Bend, places, normals, acceptance);
+    drawCandidates<W>(noiseKey(step.settings), NoiseKind::Bend, places, normals, acceptance);
     for (int i = 0; i < W; i++) {
-        const double k = lane(stiffness, i), rest[2] = {lane(ofRest[0], i), lane(ofRest[1], i)};
-        const double squareAtRest = rest[0]*rest[0]+rest[1]*rest[1], noise = 2*lane(theta, i)-1;
-        double drawn[2] = {lane(normals[0], i), lane(normals[1], i)};
-        if (k == 0 || noise <= 0)
-            drawn[0] = drawn[1] = 0;
-        else {
-            double uniform = lane(acceptance, i), uniforms[2], bend[2];
-            for (std::uint32_t draw = 1;; draw++) {
-                if (k > STIFF_JOINT) {
-                    for (int c = 0; c < 2; c++)
-                        bend[c] = rest[c]+drawn[c]/std::sqrt(k);
-                    if (uniform <= bendMeasure(pack.bending, bend[0]*bend[0]+bend[1]*bend[1]))
-                        break;
-                    drawCandidate(key, NoiseKind::Bend, pack.chain[i], pack.firstNode[i]+s, draw, drawn, uniform);
-                    continue;
-                }
-                drawUniforms(key, NoiseKind::Bend, pack.chain[i], pack.firstNode[i]+s, 2*draw-1, uniforms);
-                const double size = std::sqrt(bendSquare(pack.bending, 2*uniforms[0]-1));
-                drawUniforms(key, NoiseKind::Bend, pack.chain[i], pack.firstNode[i]+s, 2*draw, uniforms);
-                const double angle = 2*M_PI*uniforms[0], x = size*std::cos(angle), y = size*std::sin(angle);
-                bend[0] = x;
-                bend[1] = y;
-                const double dx = x-rest[0], dy = y-rest[1];
-                if (uniforms[1] <= std::exp(-0.5*k*(dx*dx+dy*dy)))
-                    break;
-            }
+        const double k = lane(stiffness, i), noise = 2*lane(theta, i)-1;
+        double own[2] = {lane(rest[0], i), lane(rest[1], i)}, bend[2] = {lane(normals[0], i), lane(normals[1], i)};
+        double lacking = 0;
+        if (k > 0 && noise > 0) {
+            drawBend(step, s, i, k, own, lane(acceptance, i), bend);
             // The mean, with the logarithm of the measure as a parabola.
-            const double slope = slopeOfBendMeasure(pack.bending, squareAtRest);
-            const double lacking = slope/(k+slope)*(1-std::sqrt(noise));
-            for (int c = 0; c < 2; c++)
-                drawn[c] = bend[c]-rest[c]*(1-lacking);
+            const double slope = slopeOfBendMeasure(pack.bending, own[0]*own[0]+own[1]*own[1]);
+            lacking = slope/(k+slope)*(1-std::sqrt(noise));
         }
         for (int c = 0; c < 2; c++)
-            lane(normals[c], i) = drawn[c];
+            lane(normals[c], i) = k > 0 && noise > 0 ? bend[c]-own[c]*(1-lacking) : 0;
     }
     const Vec axis = step.restBends[s].axis;
     segment.randomBend = axis*normals[0]+crossProduct(segment.bisector, axis)*normals[1];
+}
+
+template <int W> void RestBends<W>::drawBend(const State& step, int s, int i, double k, const double* rest,
+            double acceptance, double* bend) {
+    const Pack& pack = step.pack;
+    const NoiseKey key = noiseKey(step.settings);
+    const std::uint32_t chain = pack.chain[i], place = pack.firstNode[i]+s;
+    if (k > STIFF_JOINT) {
+        // A Gaussian with rejection.
+        for (std::uint32_t draw = 1;; draw++) {
+            for (int c = 0; c < 2; c++)
+                bend[c] = rest[c]+bend[c]/std::sqrt(k);
+            if (acceptance <= bendMeasure(pack.bending, bend[0]*bend[0]+bend[1]*bend[1]))
+                return;
+            drawCandidate(key, NoiseKind::Bend, chain, place, draw, bend, acceptance);
+        }
+    }
+    // Directions from the sphere.
+    double uniforms[4], excess;
+    std::uint32_t draw = 1;
+    do {
+        drawUniforms(key, NoiseKind::Bend, chain, place, draw++, uniforms);
+        drawUniforms(key, NoiseKind::Bend, chain, place, draw++, uniforms+2);
+        const double size = std::sqrt(bendSquare(pack.bending, 2*uniforms[0]-1)), angle = 2*M_PI*uniforms[1];
+        bend[0] = size*std::cos(angle);
+        bend[1] = size*std::sin(angle);
+        excess = (bend[0]-rest[0])*(bend[0]-rest[0])+(bend[1]-rest[1])*(bend[1]-rest[1]);
+    } while (uniforms[2] > std::exp(-0.5*k*excess));
 }
 
 template <int W> void RestBends<W>::turnFrames(const State& step, const Vec* y, Real* changes) {
