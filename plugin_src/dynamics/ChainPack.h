@@ -28,7 +28,7 @@ template <class Scalar> struct PackTwist {
     std::vector<double> directions;
     /** Of each segment, [segment][lane]; nothing if chains have no twist. */
     std::vector<Scalar> friction;
-    /** One for each lane whose chain has a joint to a frame at both ends, or is closed, so that all of it shares a torque. */
+    /** One for each lane whose chain has a joint to a frame at both ends, or is closed: all of it shares a torque. */
     std::vector<Scalar> held;
     /** The bends at rest of the joint at each node, [node][component][lane]; nothing if all joints are straight. */
     std::vector<Scalar> bends;

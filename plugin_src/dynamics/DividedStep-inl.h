@@ -69,8 +69,8 @@ template <int W> void gatherExactSegments(const Pack& pack, const double* positi
 }
 
 /**
- * Call a function with each twist in lanes: its chain and its number there, its node and its lane. The one more of rings
- * that are bent at rest, their last one, has the place of node 0, which is that of no joint there.
+ * Call a function with each twist in lanes: its chain and its number there, its node and its lane. The one more of
+ * rings that are bent at rest, their last one, has the place of node 0, which is that of no joint there.
  */
 template <int W, class Function> CYLCHAIN_INLINE void forTwists(const Pack& pack, Function function) {
     const int ofFirst = pack.closed ? pack.segments : 0, ofLast = pack.closed ? 0 : pack.segments;
