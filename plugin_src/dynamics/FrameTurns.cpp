@@ -5,18 +5,22 @@
 using namespace cylchain;
 using namespace std;
 
+namespace {
+
 /** The most segments of a block. */
-const int BLOCK = 128;
+const int SEGMENTS_OF_BLOCK = 128;
 /** How often a block is linearised around the minimum that it had before, with noise and without. */
 const int LINEARISATIONS = 2, LINEARISATIONS_WITHOUT_NOISE = 12;
 /**
  * The largest variance of the random turn of a block as a whole, in radians^2; further ones take more parts, and beyond
  * this many of them, turns are slower than they should be.
  */
-const double LARGEST_TURN = 0.5;
-const int MOST_PARTS = 8;
+const double LARGEST_VARIANCE = 0.5;
+const int MOST_PARTS_OF_STEP = 8;
 /** So many draws make the normal numbers of a place. */
 const uint32_t DRAWS_OF_NORMALS = 2;
+
+} // namespace
 
 void FrameTurns::begin(int segments, bool isClosed, double thermalEnergy) {
     count = segments;
@@ -27,8 +31,8 @@ void FrameTurns::begin(int segments, bool isClosed, double thermalEnergy) {
     targets.assign(count, 0.0);
     turns.assign(count, 0.0);
     for (vector<double>* values : {&diagonal, &coupling, &right, &found, &border})
-        values->resize(BLOCK);
-    parabolas.resize(BLOCK+1);
+        values->resize(SEGMENTS_OF_BLOCK);
+    parabolas.resize(SEGMENTS_OF_BLOCK+1);
 }
 
 void FrameTurns::draw(const NoiseKey& key, uint32_t chain, int part) {
@@ -48,8 +52,8 @@ void FrameTurns::take(const NoiseKey& key, uint32_t chain) {
         own *= scale;
         largest = max(largest, 1/own);
     }
-    const double perPart = LARGEST_TURN*min(count, BLOCK);
-    const int parts = kT > 0 ? min<double>(MOST_PARTS, ceil(largest/perPart)) : 1;
+    const double perPart = LARGEST_VARIANCE*min(count, SEGMENTS_OF_BLOCK);
+    const int parts = kT > 0 ? min<double>(MOST_PARTS_OF_STEP, ceil(largest/perPart)) : 1;
     for (double& own : stiffnesses)
         own = kT > 0 ? max(parts*own, 1/perPart) : own;
     for (int part = 0; part < parts; part++) {
@@ -62,12 +66,13 @@ void FrameTurns::take(const NoiseKey& key, uint32_t chain) {
 }
 
 void FrameTurns::sweep(const NoiseKey& key, uint32_t chain, int part) {
-    const int sweeps = count <= BLOCK ? 1 : 2;
+    const int sweeps = count <= SEGMENTS_OF_BLOCK ? 1 : 2;
     for (int number = 0; number < sweeps; number++) {
         // Blocks of the second sweep reach over the ends of those of the first, and around rings.
-        const int shift = number%2 == 0 || count <= BLOCK ? 0 : BLOCK/2, end = count+(closed ? shift : 0);
+        const int shift = number%2 == 0 || count <= SEGMENTS_OF_BLOCK ? 0 : SEGMENTS_OF_BLOCK/2;
+        const int end = count+(closed ? shift : 0);
         for (int first = closed ? shift : 0, next; first < end; first = next) {
-            next = min(end, first+(first == 0 && shift > 0 ? shift : BLOCK));
+            next = min(end, first+(first == 0 && shift > 0 ? shift : SEGMENTS_OF_BLOCK));
             const double excess = turnBlock(first, next-first, number);
             if (!(excess > 0))
                 continue;

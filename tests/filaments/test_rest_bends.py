@@ -87,6 +87,8 @@ def test_what_knows_no_bends_at_rest_refuses_them():
     filaments = chains(DNA, RestBends(0.1))
     with pytest.raises(InputError, match="turn its plus end"):
         filaments.add_end_frame(0, "minus", [0, 0, 1], angular_velocity=1e-5)
+    with pytest.raises(InputError, match="cannot have a friction"):
+        filaments.add_end_frame(0, "plus", [0, 0, 1], rotational_friction=1e5)
     filaments.add_end_frame(0, "minus", [0, 0, 1])
     with pytest.raises(InputError, match="FilamentsInContext.energies"):
         filaments[0].energies(np.array(filaments[0].positions))

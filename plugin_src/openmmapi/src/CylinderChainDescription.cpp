@@ -40,6 +40,10 @@ static void checkTwist(const cylchain::ChainList& chains) {
         if (chain.twist.isBentAtRest() && chain.twist.ends[0].angularVelocity != 0)
             throw OpenMMException("CylinderChainForce: "+name+" has bends at rest, which turn with the frame of its "
                     "first segment: turn the frame beyond its other end");
+        for (const cylchain::EndFrame& frame : chain.twist.ends)
+            if (chain.twist.isBentAtRest() && frame.friction > 0)
+                throw OpenMMException("CylinderChainForce: "+name+" has bends at rest, and no end frames that turn "
+                        "against a friction");
     }
 }
 
