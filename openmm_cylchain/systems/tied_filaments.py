@@ -180,9 +180,9 @@ class TiedFilaments(AddedFilaments):
             number,
             end,
             direction,  # type: ignore[arg-type]
-            torque,  # type: ignore[arg-type]
-            angular_velocity,  # type: ignore[arg-type]
-            rotational_friction,  # type: ignore[arg-type]
+            torque,
+            angular_velocity,
+            rotational_friction,
         )
         if own.rest_bends is not None and frame.end == "minus" and frame.angular_velocity != 0.0:
             raise InputError(
