@@ -9,7 +9,6 @@ import numpy.typing as npt
 import openmm
 from openmm import unit
 
-from ..analysis.linking import writhe
 from ..couplings.beam_curves import BeamCurves
 from ..couplings.shapes import Plane
 from ..engines.compiled_twist import set_twists_of, twists_of
@@ -371,6 +370,9 @@ class FilamentsInContext:
         InputError
             For a filament that does not exist, has no twist, or lacks a frame at an end.
         """
+        # Analysis takes long to load.
+        from ..analysis.linking import writhe
+
         number = self._twisted(filament)
         own = self._placed.filaments[number]
         positions = self._context.getState(positions=True).getPositions(asNumpy=True)._value

@@ -29,17 +29,17 @@ FRAMES = 4
 
 @pytest.fixture(scope="module")
 def grown(tmp_path_factory):
-    """A run of filaments in a sphere, all but the last of which grow, and what they are like in each frame."""
+    """A run of filaments in a narrow sphere, all but the last of which grow, and what they are like in each frame."""
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
     pool = unit.Quantity(50e-6, unit.molar)
     for number in range(6):
         growth = Growth(monomers=ACTIN_ATP, pool=pool, longest=500.0) if number < 5 else None
-        start = [-80, 12 * (number // 3), 12 * (number % 3)]
+        start = [-80, 24 * (number // 3), 24 * (number % 3)]
         filaments.add_straight(KIND, 3, start, [1, 0, 0], growth=growth)
     topology, system, positions = filaments.build()
-    contacts = capsule_contact_force(filaments, system, 10.0)
+    contacts = capsule_contact_force(filaments, system, 20.0)
     system.addForce(contacts)
-    system.addForce(filament_wall_force(filaments, system, Sphere([0, 12, 12], 130.0), 1.0))
+    system.addForce(filament_wall_force(filaments, system, Sphere([0, 12, 24], 100.0), 1.0))
     integrator = filaments.create_integrator(system, 2e7, random_seed=2, checks=False)
     simulation = new_simulation(topology, system, positions, integrator)
     directory = tmp_path_factory.mktemp("run")
