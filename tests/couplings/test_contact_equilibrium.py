@@ -139,7 +139,7 @@ def test_rods_between_walls_with_contacts(factor):
 @pytest.mark.parametrize("name", ["space", "plane"])
 def test_dense_rods(name, factor):
     system = CASES[name]
-    rows = _run(system, *_in_equilibrium(system, 1, 300), factor, 4000, 12.0, blocks=20)
+    rows = _run(system, *_in_equilibrium(system, 1, 300), factor, 5000, 12.0, blocks=20)
     check(system, rows, *np.transpose(list(REFERENCES[name].values())))
 
 
