@@ -47,18 +47,6 @@ template <class Real> struct BeamElementState {
     Vector<Real> nodeLacking;
 };
 
-/** Two vectors that are orthogonal to a unit vector and to each other, as Duff et al. 2017. */
-template <class Real> CYLCHAIN_INLINE void orthogonal(const Vector<Real>& m, Vector<Real>& first,
-            Vector<Real>& second) {
-    Real sign;
-    Vector<Real> copy = m;
-    for (int i = 0; i < LANE_COUNT<Real>; i++)
-        lane(sign, i) = std::copysign(1.0, lane(copy.z, i));
-    const Real a = -1/(sign+m.z), b = m.x*m.y*a;
-    first = {1+sign*m.x*m.x*a, sign*b, -sign*m.x};
-    second = {b, sign+m.y*m.y*a, -m.y};
-}
-
 /** The direction of the curve at a Gauss point. */
 template <class Real> CYLCHAIN_INLINE Vector<Real> directionAt(int g, const Vector<Real>& control1,
             const Vector<Real>& chord, const Vector<Real>& control2) {

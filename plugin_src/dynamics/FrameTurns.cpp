@@ -69,7 +69,7 @@ void FrameTurns::sweep(const NoiseKey& key, uint32_t chain, int part) {
     const int sweeps = count <= SEGMENTS_OF_BLOCK ? 1 : 2;
     for (int number = 0; number < sweeps; number++) {
         // Blocks of the second sweep reach over the ends of those of the first, and around rings.
-        const int shift = number%2 == 0 || count <= SEGMENTS_OF_BLOCK ? 0 : SEGMENTS_OF_BLOCK/2;
+        const int shift = number == 0 ? 0 : SEGMENTS_OF_BLOCK/2;
         const int end = count+(closed ? shift : 0);
         for (int first = closed ? shift : 0, next; first < end; first = next) {
             next = min(end, first+(first == 0 && shift > 0 ? shift : SEGMENTS_OF_BLOCK));

@@ -7,20 +7,6 @@
 /** Whether there are packs with bends at rest: in double precision alone. */
 constexpr bool HAS_BENDS_AT_REST = sizeof(Scalar) == sizeof(double);
 
-/**
- * Two vectors that are orthogonal to a unit vector and to each other (Duff et al., J. Comput. Graph. Tech. 2017, 6, 1).
- */
-template <class Real> CYLCHAIN_INLINE void orthogonal(const Vector<Real>& n, Vector<Real>& first,
-        Vector<Real>& second) {
-    Real sign;
-    Vector<Real> copy = n;
-    for (int i = 0; i < LANE_COUNT<Real>; i++)
-        lane(sign, i) = std::copysign(1.0, lane(copy.z, i));
-    const Real a = -1/(sign+n.z), b = n.x*n.y*a;
-    first = {1+sign*n.x*n.x*a, sign*b, -sign*n.x};
-    second = {b, sign+n.y*n.y*a, -n.y};
-}
-
 /** A vector that is orthogonal to a unit vector, carried over to another one by parallel transport. */
 template <class Real> CYLCHAIN_INLINE Vector<Real> transported(const Vector<Real>& vector, const Vector<Real>& from,
         const Vector<Real>& to) {

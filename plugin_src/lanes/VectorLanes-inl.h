@@ -80,6 +80,20 @@ template <class Real> CYLCHAIN_INLINE Vector<Real> crossProduct(const Vector<Rea
     return {a.y*b.z-a.z*b.y, a.z*b.x-a.x*b.z, a.x*b.y-a.y*b.x};
 }
 
+/**
+ * Two vectors that are orthogonal to a unit vector and to each other (Duff et al., J. Comput. Graph. Tech. 2017, 6, 1).
+ */
+template <class Real> CYLCHAIN_INLINE void orthogonal(const Vector<Real>& n, Vector<Real>& first,
+        Vector<Real>& second) {
+    Real sign;
+    Vector<Real> copy = n;
+    for (int i = 0; i < LANE_COUNT<Real>; i++)
+        lane(sign, i) = std::copysign(1.0, lane(copy.z, i));
+    const Real a = -1/(sign+n.z), b = n.x*n.y*a;
+    first = {1+sign*n.x*n.x*a, sign*b, -sign*n.x};
+    second = {b, sign+n.y*n.y*a, -n.y};
+}
+
 /** A vector of one lane in all lanes. */
 template <class Many, class Real> CYLCHAIN_INLINE Vector<Many> inLanes(const Vector<Real>& v) {
     return {splat<Many>(v.x), splat<Many>(v.y), splat<Many>(v.z)};

@@ -24,6 +24,7 @@ from support.twisted_chains import (
     assert_near,
     in_context,
     mean_square_angle_of_an_end,
+    squares_of_end_angles,
 )
 
 CIRCLE = replace(DNA, bending_model="inscribed-circle")
@@ -213,27 +214,8 @@ def test_chains_of_other_lengths_share_lanes():
 @pytest.mark.parametrize("step", [1e3, 1e2])
 def test_torsional_diffusion_of_ends(step):
     """Without bends, that of the discrete modes of straight chains, by the split step."""
-    generator = np.random.default_rng(1)
-    segments, count, time = 16, 64, 1e4
-    filaments = Filaments(VISCOSITY, TEMPERATURE)
-    for number in range(count):
-        filaments.add_straight(
-            replace(DNA, bending_rigidity=1e5 * KT),
-            segments,
-            [0, 0, 100.0 * number],
-            [1, 0, 0],
-            clamped=[0, 1],
-            rest_bends=RestBends(0.0),
-        )
-    context, own = in_context(filaments, step)
-    for number in range(count):
-        drawn = generator.normal(0.0, np.sqrt(LENGTH / 100), segments - 1)
-        own.set_twists(number, np.concatenate([[0], drawn, [0]]))
-    angles = []
-    for _ in range(161):
-        angles.append([own.twists(number)._value[[0, -1]] for number in range(count)])
-        context.getIntegrator().step(round(time / step))
-    assert_near((np.diff(angles, axis=0) ** 2).mean(axis=2), mean_square_angle_of_an_end(segments, time))
+    squares = squares_of_end_angles(step, 1e4, 16, rest_bends=RestBends(0.0))
+    assert_near(squares, mean_square_angle_of_an_end(16, 1e4))
 
 
 def correlation_of_sines(concentration, time):

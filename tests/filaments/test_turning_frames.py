@@ -6,21 +6,12 @@ import pytest
 from openmm import unit
 from scipy.linalg import expm
 
-from openmm_cylchain import Filaments, FilamentType, InputError, capsule_contact_force
+from openmm_cylchain import Filaments, InputError
 from openmm_cylchain.engines.compiled import CylinderChainForce
-from support.contexts import new_context, positions_of
+from support.contexts import positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
+from support.twisted_chains import DNA, SIGMAS, in_context
 
-SIGMAS = 4.0
-LENGTH = 5.0
-DNA = FilamentType(
-    name="DNA",
-    diameter=2.0,
-    segment_length=LENGTH,
-    bending_rigidity=50.0 * KT,
-    stretching_modulus=4000.0 * KT,
-    torsional_rigidity=100.0 * KT,
-)
 STIFFNESS, FRICTION = DNA.twist_stiffness, DNA.axial_friction(VISCOSITY)
 SEGMENTS = 8
 BEAD = 20.0 * FRICTION
@@ -38,23 +29,6 @@ def chains_with_beads(count, temperature, minus="held", segments=(SEGMENTS,), to
             filaments.add_end_frame(number, "minus", [0, 0, 1], rotational_friction=friction)
         filaments.add_end_frame(number, "plus", [0, 0, 1], torque=torque, rotational_friction=bead)
     return filaments
-
-
-def in_context(filaments, step, pull=0.0, platform="CPU", contacts=False):
-    """A Context of filaments that are pulled, and held along z at their plus ends, and a FilamentsInContext."""
-    _, system, positions = filaments.build()
-    if contacts:
-        system.addForce(capsule_contact_force(filaments, system, 2.0))
-    force = openmm.CustomExternalForce("-pull*z")
-    force.addPerParticleParameter("pull")
-    for nodes in filaments.node_indices:
-        force.addParticle(int(nodes[-1]), [pull + 40.0 * KT])
-        force.addParticle(int(nodes[-2]), [-40.0 * KT])
-    system.addForce(force)
-    context = new_context(
-        system, positions, filaments.create_integrator(system, step, random_seed=1, checks=False), platform
-    )
-    return context, filaments.in_context(context)
 
 
 def equations():
@@ -77,7 +51,7 @@ RELAXATION = 1.0 / np.linalg.eigvals(equations()).real.min()
 def test_bead_turns_back_as_it_must():
     """As in the solution of the linear equations of a straight chain, which begins with a turn in its last joint."""
     filaments = chains_with_beads(1, 0.0)
-    context, own = in_context(filaments, RELAXATION / 200)
+    context, own = in_context(filaments, RELAXATION / 200, pull=0.0)
     twists = np.zeros(SEGMENTS + 1)
     twists[-1] = 0.1
     own.set_twists(0, twists)
@@ -92,7 +66,7 @@ def test_bead_turns_back_as_it_must():
 def test_torque_on_a_bead_turns_it_and_its_chain_with_a_free_end(step):
     """In the end, all turns alike, and each joint has the torque that turns what is behind it."""
     filaments = chains_with_beads(1, 0.0, minus="free", torque=TORQUE)
-    context, own = in_context(filaments, step)
+    context, own = in_context(filaments, step, pull=0.0)
     speed = TORQUE / (BEAD + SEGMENTS * FRICTION)
     context.getIntegrator().step(round(max(10, 20 * RELAXATION / step)))
     before = own.twists(0)._value
@@ -164,7 +138,7 @@ def test_bead_turns_alike_where_filaments_may_touch(platform):
     ends = []
     for contacts in (False, True):
         filaments = chains_with_beads(3, TEMPERATURE, "bead", torque=TORQUE)
-        context, own = in_context(filaments, RELAXATION, 2.0 * KT, platform, contacts)
+        context, own = in_context(filaments, RELAXATION, 2.0 * KT, platform=platform, contacts=contacts)
         context.getIntegrator().step(6)
         ends.append([own.twists(number)._value for number in range(3)])
     assert np.array(ends[0]) == pytest.approx(np.array(ends[1]), abs=1e-3)
@@ -189,7 +163,7 @@ def test_beads_are_given_with_units_and_survive_xml():
         for end in (0, 1)
     ]
     assert frames[:4] == frames[4:] and str(BEAD)[:8] in frames[1]
-    _, own = in_context(chains_with_beads(1, TEMPERATURE), 1e3)
+    _, own = in_context(chains_with_beads(1, TEMPERATURE), 1e3, pull=0.0)
     with pytest.raises(InputError, match="no frame that is held"):
         own.turn_end(0, "plus", 0.1)
 

@@ -39,6 +39,7 @@ from support.twisted_chains import (
     in_context,
     mean_and_error,
     mean_square_angle_of_an_end,
+    squares_of_end_angles,
 )
 
 # Of B-DNA, with 10.5 base pairs of 0.34 nm in a turn.
@@ -513,25 +514,11 @@ def test_torsional_diffusion_of_ends(step):
 
     Chains are straight: bends turn ends by writhe as well.
     """
-    generator = np.random.default_rng(1)
-    segments, chains, time = 16, 64, 1e4
-    filaments = Filaments(VISCOSITY, TEMPERATURE)
-    for number in range(chains):
-        filaments.add_straight(
-            replace(DNA, bending_rigidity=1e5 * KT), segments, [0, 0, 100.0 * number], [1, 0, 0], clamped=[0, 1]
-        )
-    context, own = in_context(filaments, step)
-    for number in range(chains):
-        drawn = generator.normal(0.0, np.sqrt(LENGTH / 100), segments - 1)
-        own.set_twists(number, np.concatenate([[0], drawn, [0]]))
-    angles = []
-    for _ in range(161):
-        angles.append([own.twists(number)._value[[0, -1]] for number in range(chains)])
-        context.getIntegrator().step(round(time / step))
+    segments, time = 16, 1e4
     exact = mean_square_angle_of_an_end(segments, time)
     long_chain = 4 * KT * np.sqrt(time / (np.pi * DNA.axial_friction(VISCOSITY) * DNA.twist_stiffness))
     assert 0.8 < exact / long_chain < 0.9
-    assert_near((np.diff(angles, axis=0) ** 2).mean(axis=2), exact)
+    assert_near(squares_of_end_angles(step, time, segments), exact)
 
 
 def turned_by_writhe(own, filaments):

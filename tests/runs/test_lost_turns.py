@@ -5,19 +5,12 @@ import warnings
 import numpy as np
 import pytest
 
-from openmm_cylchain import Filaments, FilamentType, TwistWarning
+from openmm_cylchain import Filaments, TwistWarning
 from openmm_cylchain.runs.lost_turns import LostTurns
 from support.contexts import new_context, positions_of
-from support.solvent import KT, TEMPERATURE, VISCOSITY
+from support.solvent import TEMPERATURE, VISCOSITY
+from support.twisted_chains import DNA
 
-DNA = FilamentType(
-    name="DNA",
-    diameter=2.0,
-    segment_length=5.0,
-    bending_rigidity=50.0 * KT,
-    stretching_modulus=4000.0 * KT,
-    torsional_rigidity=100.0 * KT,
-)
 RING = 24
 
 

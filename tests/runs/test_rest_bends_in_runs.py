@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from openmm_cylchain import InputError, analysis
-from openmm_cylchain.cli import main
 from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.created_simulation import create_simulation
 from openmm_cylchain.runs.keys import ConfigurationError
-from support.small_runs import stop_and_resume
+from support.small_runs import run_command, simulated, stop_and_resume
 
 BENT = """
 title = "curved DNA"
@@ -41,16 +40,10 @@ seed = 3
 """
 
 
-def _run(text, folder):
-    (folder / "input.toml").write_text(text)
-    return ["run", str(folder / "input.toml"), "--output", str(folder / "out")]
-
-
 @pytest.fixture(scope="module")
 def bent(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bent")
-    assert main(_run(BENT, folder)) == 0
-    return folder / "out"
+    return simulated(folder, BENT)
 
 
 def test_bends_of_tables_are_those_of_filaments():
@@ -80,7 +73,7 @@ def test_energies_are_those_of_bends_at_rest(bent):
 
 
 def test_a_resumed_run_is_the_same(bent, tmp_path, monkeypatch):
-    stop_and_resume(_run(BENT, tmp_path), monkeypatch, checkpoints=3)
+    stop_and_resume(run_command(tmp_path, BENT), monkeypatch, checkpoints=3)
     for name in ("twists.npy", "energies.csv", "trajectory.dcd"):
         assert (tmp_path / "out" / name).read_bytes() == (bent / name).read_bytes()
 

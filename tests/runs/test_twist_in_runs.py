@@ -12,20 +12,14 @@ from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.created_simulation import create_simulation
 from openmm_cylchain.runs.keys import ConfigurationError
 from openmm_cylchain.units.quantities import thermal_energy
-from support.small_runs import stop_and_resume
+from support.small_runs import run_command, simulated, stop_and_resume
 from support.twisted_run import WOUND
-
-
-def _run(text, folder):
-    (folder / "input.toml").write_text(text)
-    return ["run", str(folder / "input.toml"), "--output", str(folder / "out")]
 
 
 @pytest.fixture(scope="module")
 def wound(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wound")
-    assert main(_run(WOUND, folder)) == 0
-    return folder / "out"
+    return simulated(folder, WOUND)
 
 
 def test_twist_and_torque_at_each_report(wound):
@@ -88,7 +82,7 @@ def test_exports_and_pictures_show_frames(wound, tmp_path):
 def test_intrinsic_twist(wound, tmp_path):
     """It is among the turns, and the torque is that without it."""
     text = WOUND.replace('"100 nm"', '"100 nm"\nintrinsic_twist = "-34.3 deg/angstrom"')
-    assert main(_run(text, tmp_path)) == 0
+    simulated(tmp_path, text)
     for own, expected in zip(
         analysis.load(tmp_path / "out").material_frames(3), analysis.load(wound).material_frames(3)
     ):
@@ -100,7 +94,7 @@ def test_intrinsic_twist(wound, tmp_path):
 
 
 def test_a_resumed_run_is_the_same(wound, tmp_path, monkeypatch):
-    stop_and_resume(_run(WOUND, tmp_path), monkeypatch, checkpoints=3)
+    stop_and_resume(run_command(tmp_path, WOUND), monkeypatch, checkpoints=3)
     for name in ("twist.csv", "twists.npy", "energies.csv", "trajectory.dcd"):
         assert (tmp_path / "out" / name).read_bytes() == (wound / name).read_bytes()
 
@@ -132,8 +126,8 @@ def test_hands_that_follow_the_helix(tmp_path, monkeypatch):
     assert kind.hands[0].helix.stall_torque == pytest.approx(11.0 * 0.602214, rel=1e-5)
     assert kind.hands[0].helix.torque_range == 100.0 and kind.hands[1].helix is None
     (tmp_path / "whole").mkdir()
-    assert main(_run(text, tmp_path / "whole")) == 0
-    stop_and_resume(_run(text, tmp_path), monkeypatch, checkpoints=3)
+    assert main(run_command(tmp_path / "whole", text)) == 0
+    stop_and_resume(run_command(tmp_path, text), monkeypatch, checkpoints=3)
     for name in ("twist.csv", "twists.npy", "linkers.csv", "trajectory.dcd"):
         assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "whole" / "out" / name).read_bytes()
     with pytest.raises(ConfigurationError, match="pitch"):
@@ -169,7 +163,7 @@ def test_bead_turns_against_its_friction(tmp_path):
         'angular_velocity = "3.141592653589793 1/us"', 'torque = "60 pN nm"\nrotational_friction = "13 pN nm us"'
     )
     text = text.replace("[simulation]", '[simulation]\nduration = "4 us"')
-    assert main(_run(text, tmp_path)) == 0
+    assert main(run_command(tmp_path, text)) == 0
     turns = analysis.load(tmp_path / "out").twist["twist (turns)"].mean(axis=1)
     rigidity = 100.0 * thermal_energy(298) / 0.602214
     end, relaxation = 60.0 * 100.0 / rigidity / (2 * np.pi), 13.0 * 100.0 / rigidity

@@ -107,10 +107,15 @@ seed = 5
 """
 
 
+def run_command(folder, text):
+    """The command that runs a configuration, which it writes to a folder."""
+    (folder / "input.toml").write_text(text)
+    return ["run", str(folder / "input.toml"), "--output", str(folder / "out")]
+
+
 def simulated(folder, text):
     """The directory of a run of a configuration."""
-    (folder / "input.toml").write_text(text)
-    assert main(["run", str(folder / "input.toml"), "--output", str(folder / "out")]) == 0
+    assert main(run_command(folder, text)) == 0
     return folder / "out"
 
 

@@ -1,12 +1,14 @@
 """Chains with twist in a Context, and averages over them beside exact ones."""
 
+from dataclasses import replace
+
 import numpy as np
 import openmm
 import pytest
 
-from openmm_cylchain import FilamentType, capsule_contact_force
+from openmm_cylchain import Filaments, FilamentType, capsule_contact_force
 from support.contexts import new_context
-from support.solvent import KT, VISCOSITY
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 SIGMAS = 4.0
 LENGTH = 5.0
@@ -80,3 +82,21 @@ def mean_square_angle_of_an_end(segments, time):
     own = values[1:], modes[0, 1:] ** 2
     whole = 2 * KT * time / (friction * segments)
     return whole + np.sum(own[1] * 2 * KT / own[0] * (1 - np.exp(-own[0] * time / friction)))
+
+
+def squares_of_end_angles(step, time, segments, chains=64, **options):
+    """Of both free ends of straight chains: squares of what they turn by in a time, (times, chains)."""
+    generator = np.random.default_rng(1)
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    for number in range(chains):
+        start, kind = [0, 0, 100.0 * number], replace(DNA, bending_rigidity=1e5 * KT)
+        filaments.add_straight(kind, segments, start, [1, 0, 0], clamped=[0, 1], **options)
+    context, own = in_context(filaments, step)
+    for number in range(chains):
+        drawn = generator.normal(0.0, np.sqrt(LENGTH / 100), segments - 1)
+        own.set_twists(number, np.concatenate([[0], drawn, [0]]))
+    angles = []
+    for _ in range(161):
+        angles.append([own.twists(number)._value[[0, -1]] for number in range(chains)])
+        context.getIntegrator().step(round(time / step))
+    return (np.diff(angles, axis=0) ** 2).mean(axis=2)
