@@ -267,10 +267,10 @@ public:
             std::vector<double>& friction) const;
     /**
      * Let the joints of a chain with twist be bent at rest: their bending energy is that of the vector b-R k in place
-     * of the bend b, where R k is a vector of the material.  mechanics/ChainTwist.h says of which frame.  The frame of the
-     * first segment is state then: it is in the first twist of an open chain, and in one more, the last, of a closed
-     * one.  Segments turn when nodes have moved.  The energy of a Context is that for its twists; there are no forces
-     * outside of steps.
+     * of the bend b, where R k is a vector of the material.  mechanics/ChainTwist.h says of which frame.  The frame of
+     * the first segment is state then: it is in the first twist of an open chain, and in one more, the last, of a
+     * closed one.  Segments turn when nodes have moved.  The energy of a Context is that for its twists; there are no
+     * forces outside of steps.
      *
      * @param chain  the index of the chain, which has twist
      * @param bends  two components of each joint in the material frame half-way over it; none if all joints are
