@@ -112,7 +112,7 @@ class CompiledEngine(Engine):
                 _add_beam_chain(force, filament, nodes, controls, placed.viscosity, placed.temperature)
             force.setChainName(number, filament_label(number, filament))
         for frame in placed.end_frames:
-            set_end_frame(force, placed.filaments[frame.filament], frame)
+            set_end_frame(force, placed.filaments[frame.filament], frame, placed.bodies)
         for tether in placed.tethers:
             force.addTether(tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
         for body, particles in zip(placed.bodies, placed.body_indices):

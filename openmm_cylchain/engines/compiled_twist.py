@@ -8,21 +8,27 @@ from ..errors import InputError
 from ..filaments.twist import FILAMENT_ENDS
 
 
-def set_end_frame(force, filament, frame):
-    """Give a CylinderChainForce the frame beyond an end of a Filament: an EndFrame.
+def set_end_frame(force, filament, frame, bodies):
+    """Give a CylinderChainForce, with its PlacedBodies, the frame beyond an end of a Filament: an EndFrame.
 
     Half a segment of material is between the frame of the last segment and one that is held, or has a friction.
     """
     has_joint = frame.is_held or frame.rotational_friction is not None
+    place = frame.filament, FILAMENT_ENDS.index(frame.end)
+    direction = np.array(frame.direction)
+    if frame.body is not None and not bodies[frame.body].planar:
+        # The frames of planar bodies are not turned as they begin.
+        direction = bodies[frame.body].rotation.T @ direction
     force.setEndFrame(
-        frame.filament,
-        FILAMENT_ENDS.index(frame.end),
-        openmm.Vec3(*frame.direction),
+        *place,
+        openmm.Vec3(*direction),
         2.0 * filament.type.twist_stiffness if has_joint else 0.0,
         frame.torque or 0.0,
         frame.angular_velocity,
         frame.rotational_friction or 0.0,
     )
+    if frame.body is not None:
+        force.setEndFrameBody(*place, frame.body)
 
 
 def twists_of(context, number):

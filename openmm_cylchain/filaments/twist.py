@@ -41,6 +41,8 @@ class EndFrame:
         Of a frame that is held, about the direction, in radians/ps.
     rotational_friction : float or None
         Of a frame that turns against it, in kJ ps/mol.
+    body : int or None
+        The rigid body that carries the frame. The direction is that where the body begins.
     """
 
     filament: int
@@ -49,11 +51,17 @@ class EndFrame:
     torque: float | None = None
     angular_velocity: float = 0.0
     rotational_friction: float | None = None
+    body: int | None = None
 
     @property
     def is_held(self) -> bool:
-        """Whether the frame turns as fast as it is told."""
+        """Whether the frame turns as fast as it is told, in space or against the body that carries it."""
         return self.torque is None and self.rotational_friction is None
+
+    @property
+    def keeps_turns(self) -> bool:
+        """Whether it is known how far the frame has turned."""
+        return self.is_held and self.body is None
 
     def __post_init__(self) -> None:
         label = "End frame"
@@ -71,6 +79,10 @@ class EndFrame:
         if self.rotational_friction is not None:
             friction = positive(self.rotational_friction, ROTATIONAL_FRICTION, f"{label}: rotational_friction")
             object.__setattr__(self, "rotational_friction", friction)
+        if self.body is not None:
+            object.__setattr__(self, "body", whole_number(self.body, 0, f"{label}: body"))
+        if self.body is not None and not self.is_held:
+            raise InputError(f"{label}: a frame that a body carries turns with it: give no torque and no friction.")
         if velocity != 0.0 and not self.is_held:
             raise InputError(
                 f"{label}: an angular_velocity is that of a frame that is held: give it no torque and no "

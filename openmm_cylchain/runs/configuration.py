@@ -256,7 +256,7 @@ def _configuration(raw, text, folder, lines):
         tuple(read_joint(own, groups) for own in tables["joint"]),
         tuple(barrier for own in tables["barrier"] for barrier in read_barrier(own, groups)),
         bodies,
-        tuple(read_end_frame(own, groups) for own in tables["end_frame"]),
+        tuple(read_end_frame(own, groups, bodies) for own in tables["end_frame"]),
         monomers,
         tables,
         dict(_start_files(tables["filament"], folder)),

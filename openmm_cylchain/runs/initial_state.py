@@ -232,6 +232,7 @@ def place_filaments(configuration, engine, seed, kinetics=True, begun=None, dele
                     torque=own.torque,
                     angular_velocity=own.angular_velocity,
                     rotational_friction=own.rotational_friction,
+                    body=own.body,
                 )
     for own, entries in zip(configuration.linkers if kinetics else (), configuration.tables["linkers"]):
         anchors = _anchors(own, configuration, filaments)

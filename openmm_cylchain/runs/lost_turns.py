@@ -27,7 +27,7 @@ class LostTurns:
         for number, own in enumerate(filaments):
             if not has_twist(own.type) or own.segments > _MOST_SEGMENTS or not own.takes_part:
                 continue
-            held = [frame for frame in frames.get(number, []) if frame.is_held]
+            held = [frame for frame in frames.get(number, []) if frame.keeps_turns]
             if own.closed or len(held) == 2:
                 signs = {"minus": -1.0, "plus": 1.0}
                 self._speeds[number] = sum(signs[frame.end] * frame.angular_velocity for frame in held) / (2.0 * np.pi)

@@ -368,7 +368,7 @@ class FilamentsInContext:
         Raises
         ------
         InputError
-            For a filament that does not exist, has no twist, or lacks a frame at an end.
+            For a filament that does not exist, has no twist, lacks a frame at an end, or has one that a body carries.
         """
         # Analysis takes long to load.
         from ..analysis.linking import writhe
@@ -379,6 +379,8 @@ class FilamentsInContext:
         nodes = positions[self._placed.node_indices[number]]
         if not own.closed:
             frames = {frame.end: frame for frame in self._placed.end_frames if frame.filament == number}
+            if any(frame.body is not None for frame in frames.values()):
+                raise InputError(f"Filament {number} has no linking number: a body carries a frame at an end.")
             if len(frames) < 2:
                 raise InputError(
                     f"Filament {number} has no linking number: it is no ring, and lacks a frame at an end."

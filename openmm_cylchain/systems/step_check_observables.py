@@ -45,7 +45,7 @@ def _kinds(filaments):
     for number, one in enumerate(filaments):
         key = (one.type, one.segments, one.closed, one.planar, one.clamped, one.clamped_tangents, one.propulsion)
         own_frames = sorted(frames.get(number, []), key=lambda frame: frame.end)
-        key += (one.rest_bends, *(replace(frame, filament=0) for frame in own_frames))
+        key += (one.rest_bends, *(replace(frame, filament=0, body=frame.body and 0) for frame in own_frames))
         groups.setdefault(key, []).append(number)
     kinds: list[Kind] = []
     for numbers in groups.values():

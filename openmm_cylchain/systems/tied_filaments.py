@@ -126,6 +126,7 @@ class TiedFilaments(AddedFilaments):
         torque: Scalar | None = None,
         angular_velocity: Scalar = 0.0,
         rotational_friction: Scalar | None = None,
+        body: int | None = None,
     ) -> None:
         """Bind the material at an end of a filament with twist to a frame beyond it, such as that of a magnetic bead.
 
@@ -139,6 +140,14 @@ class TiedFilaments(AddedFilaments):
             Z dpsi/dt = torque + noise -(2C/l0) m at a plus end, + (2C/l0) m at a minus end,
 
         of first order in the step, and in equilibrium at any step.
+
+        A frame that a rigid body carries turns with it, whichever way it turns, and its joint turns the body: with the
+        direction a of the frame, and b of the last segment, by the couple
+
+            -(2C/l0) m (a+b)/(1+a.b) at a plus end, and the opposite one at a minus end.
+
+        That is known from the start of a step, so that 2C/l0 must turn the body by itself little in one, which
+        ``recommended_time_step`` knows. The body holds the end by links, as it does without a frame.
 
         Parameters
         ----------
@@ -156,12 +165,16 @@ class TiedFilaments(AddedFilaments):
             How fast a frame that is held turns about the direction; radians/ps if a plain number.
         rotational_friction : energy time, optional
             Of a frame that turns against it, such as a bead: pi eta d**3 of a sphere about its middle.
+        body : int, optional
+            The number of the body that carries the frame, as ``add_body`` returns it: the direction is that where the
+            body begins, and an angular_velocity is that against the body.
 
         Raises
         ------
         InputError
-            For a filament or an end that does not exist, a ring, a filament without twist, a second frame, a friction
-            that is not positive, or an angular velocity of a frame that is not held.
+            For a filament, an end or a body that does not exist, a ring, a filament without twist, a second frame, a
+            friction that is not positive, an angular velocity of a frame that is not held, or a torque or friction of
+            one that a body carries.
 
         Examples
         --------
@@ -183,13 +196,18 @@ class TiedFilaments(AddedFilaments):
             torque,
             angular_velocity,
             rotational_friction,
+            body,
         )
+        if frame.body is not None and frame.body >= len(self.bodies):
+            raise InputError(f"{label}: body {frame.body} does not exist: add it first, by add_body.")
         if own.rest_bends is not None and frame.end == "minus" and frame.angular_velocity != 0.0:
             raise InputError(
                 f"{label}: filament {number} has rest_bends, which would turn with its minus end: turn its plus end."
             )
-        if own.rest_bends is not None and frame.rotational_friction is not None:
-            raise InputError(f"{label}: filament {number} has rest_bends, and its frames cannot have a friction yet.")
+        if own.rest_bends is not None and (frame.body, frame.rotational_friction) != (None, None):
+            raise InputError(
+                f"{label}: filament {number} has rest_bends, and its frames cannot have a friction or a body yet."
+            )
         if any(other.filament == number and other.end == end for other in self._end_frames):
             raise InputError(f"{label}: the {end} end of filament {number} has a frame already.")
         self._end_frames.append(frame)

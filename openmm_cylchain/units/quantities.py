@@ -113,6 +113,10 @@ def shown(value: Any) -> str:
 def _converted(quantity, target, name):
     if quantity.unit.is_compatible(target):
         return quantity.value_in_unit(target)
+    # Angles are numbers.
+    plain = quantity.unit / unit.radian
+    if plain.is_compatible(target):
+        return unit.Quantity(quantity._value, plain).value_in_unit(target)
     molar = quantity.unit / unit.mole
     if molar.is_compatible(target):
         per_particle = unit.Quantity(quantity._value, molar).value_in_unit(target)

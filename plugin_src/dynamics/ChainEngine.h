@@ -94,6 +94,15 @@ struct StepSettings {
     std::vector<std::vector<double> >* twistChanges = NULL;
     /** What hands do to the turns of each of these chains, each pair of segments once; NULL if none does. */
     const std::vector<std::vector<TurnedPair> >* turnedPairs = NULL;
+    /**
+     * For each of these chains, where the frames beyond both ends point, six numbers, if rigid bodies carry any of them;
+     * none for others. NULL if there are no such bodies.
+     */
+    const std::vector<std::vector<double> >* endDirections = NULL;
+    /** Where to write the torques of the joints to these frames at the end of the step: two numbers for each chain. */
+    double* endTorques = NULL;
+    /** The torques of these frames on each rigid body, three numbers, as they are known in an iteration; or NULL. */
+    const double* bodyTorques = NULL;
     /** Whether chains whose implicit step fails take it in parts; otherwise it has failed. */
     bool mayDivide = true;
 };

@@ -31,15 +31,17 @@ public:
     explicit ImplicitTwist(ImplicitState<W>& step) : step(step), pack(step.pack), twist(pack.twist),
             ofSegments(step), segments(pack.segments), first(CLOSED && !twist.isBentAtRest() ? 1 : 0),
             joints(step.joints), newSegments(step.newSegments) {
-        const bool hasDirections = twist.isPresent() && (!CLOSED || twist.isBentAtRest());
-        for (int end = 0; end < 2 && hasDirections; end++)
-            directions[end] = {loaded<Real>(twist.directions, 3*end), loaded<Real>(twist.directions, 3*end+1),
-                    loaded<Real>(twist.directions, 3*end+2)};
         for (int i = 0; i < W && twist.isPresent(); i++)
             isFilledUp |= pack.chain[i] >= 0 && pack.segmentsOfLane[i] < segments;
     }
     /** Describe the start of a step, draw the noise, and eliminate the turns of segments. */
     __attribute__((noinline)) void begin() {
+        endDirections = twist.directions;
+        if (step.settings.endDirections != NULL)
+            followBodies();
+        for (int end = 0; end < 2; end++)
+            directions[end] = {loaded<Real>(endDirections, 3*end), loaded<Real>(endDirections, 3*end+1),
+                    loaded<Real>(endDirections, 3*end+2)};
         Real frictionBefore = loaded<Real>(twist.friction, CLOSED ? segments-1 : 0);
         for (int s = 0; s <= segments; s++) {
             TwistedJoint<Real>& joint = joints[s];
@@ -107,6 +109,8 @@ public:
                 share = newShare;
             }
         }
+        if (step.settings.endTorques != NULL)
+            tellTorques();
     }
     /** A segment as addForces() has found it. */
     CYLCHAIN_INLINE NewSegmentGeometry<Real> getSegment(int s) const {
@@ -166,7 +170,7 @@ public:
     }
     /** Find how the twists have changed when the nodes have moved by y. */
     __attribute__((noinline)) void findChanges(const Vec* y, Double* changes) {
-        findSweptAreas<W, CLOSED>(pack, step.start, y, changes);
+        findSweptAreas<W, CLOSED>(pack, endDirections, step.start, y, changes);
         solve<Moment::End>(y, changes);
         for (int place = 0; place < (segments+1)*REGISTERS; place++) {
             const int s = place/REGISTERS, part = place%REGISTERS;
@@ -192,6 +196,8 @@ private:
     const int segments, first;
     TwistedJoint<Real>* const joints;
     NewSegmentGeometry<Real>* const newSegments;
+    /** Of frames beyond ends in this step, [end][axis][lane], and the same in lanes. */
+    std::vector<double> endDirections;
     Vec directions[2];
     /** By how much frames turn without the torques of their joints, as in the lists of these. */
     double turnsOfFrames[2*W];
@@ -226,6 +232,26 @@ private:
             function(0, i, i);
             function(pack.segmentsOfLane[i], i, W+i);
         }
+    }
+    /** Let frames that rigid bodies carry point where they do as the step begins. */
+    void followBodies() {
+        for (int i = 0; i < W; i++) {
+            if (pack.chain[i] < 0)
+                continue;
+            const std::vector<double>& own = (*step.settings.endDirections)[pack.chain[i]];
+            for (std::size_t k = 0; k < own.size(); k++)
+                endDirections[k*W+i] = own[k];
+        }
+    }
+    /** Tell bodies the torques of the frames that they carry, as they will be when nodes and segments have moved. */
+    void tellTorques() const {
+        forEnds([&] (int s, int i, int end) {
+            if (pack.chain[i] < 0)
+                return;
+            Real change = (joints[s].torque-joints[s].constant)/(joints[s].implicit+TINY);
+            step.settings.endTorques[2*pack.chain[i]+end/W] = twist.stiffness[s*W+i]*
+                    (lane(step.start.twists[s], i)+lane(change, i)+turnsOfFrames[end]);
+        });
     }
     void draw() {
         const NoiseKey key = noiseKey(step.settings);

@@ -77,11 +77,12 @@ template <class Real> CYLCHAIN_INLINE Real sweptArea(const Vector<Real>& a, cons
  * Find the areas that the joints of a pack sweep in a step, in double precision: an error would stay in the twists, and
  * sums of areas along a chain are what its linking number is kept by.
  *
- * @param y      how far nodes move
- * @param areas  receives those of the joint at each node
+ * @param directions  those of the frames beyond ends, [end][axis][lane]
+ * @param y           how far nodes move
+ * @param areas       receives those of the joint at each node
  */
-template <int W, bool CLOSED> void findSweptAreas(const Pack& pack, const StepStart<W>& start,
-            const Vector<typename Lanes<W>::Type>* y, typename DoubleLanes<W>::Type* areas) {
+template <int W, bool CLOSED> void findSweptAreas(const Pack& pack, const std::vector<double>& directions,
+            const StepStart<W>& start, const Vector<typename Lanes<W>::Type>* y, typename DoubleLanes<W>::Type* areas) {
     constexpr int REGISTERS = DoubleLanes<W>::REGISTERS;
     typedef typename DoubleLanes<W>::Type Real;
     typedef Vector<Real> Vec;
@@ -100,11 +101,9 @@ template <int W, bool CLOSED> void findSweptAreas(const Pack& pack, const StepSt
         for (int i = 0; i < LANE_COUNT<Real>; i++)
             lane(own, i) = pack.segmentsOfLane[part*LANE_COUNT<Real>+i];
         Swept ends[2] = {};
-        for (int end = 0; end < 2; end++) {
-            const std::vector<double>& directions = pack.twist.directions;
+        for (int end = 0; end < 2; end++)
             ends[end] = {{loadedPart(directions, 3*end), loadedPart(directions, 3*end+1),
                     loadedPart(directions, 3*end+2)}, splat<Real>(1)};
-        }
         auto withEnd = [&] (int s, const Swept& swept) -> Swept {
             if (!isFilledUp)
                 return swept;

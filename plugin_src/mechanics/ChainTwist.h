@@ -15,6 +15,8 @@ struct EndFrame {
     double torque = 0, angularVelocity = 0;
     /** Of a frame with a stiffness that turns against the solvent, as a bead does; zero for any other. */
     double friction = 0;
+    /** The rigid body that carries the frame, in whose own frame the direction is then; -1 if none does. */
+    int body = -1;
 };
 
 /**

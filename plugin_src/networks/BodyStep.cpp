@@ -170,6 +170,8 @@ void BodyStep::eliminate(const CouplingTerm* newTerms, int count, double* moves)
     }
     for (int i : going) {
         State& body = states[i];
+        if (settings.bodyTorques != NULL)
+            copy_n(settings.bodyTorques+3*i, 3, body.frameTorque);
         if (!body.held)
             turnFreely(bodies[i], body);
         describeHalfway(bodies[i], body);
@@ -217,7 +219,7 @@ void BodyStep::setRight(const RigidBody& own, const State& body, double* result)
     for (int k = 0; k < 3; k++) {
         result[k] = body.force[k]+body.randomForce[k]-own.friction/settings.stepSize*(body.moved[k]-body.drift[k]);
         result[3+k] = 0.5*(before[k]+now[k]+pullsBefore[k]-pullsNow[k])+body.turnedRandomTorque[k]-drag[k]+
-                body.metricTorque[k];
+                body.metricTorque[k]+body.frameTorque[k];
     }
 }
 
@@ -228,7 +230,7 @@ void BodyStep::turnFreely(const RigidBody& own, State& body) const {
     body.start.turnMatrix(own.rotationalFriction, friction);
     findTorque(body.moments, body.start, torque);
     for (int k = 0; k < 3; k++)
-        torque[k] += random[k];
+        torque[k] += random[k]+body.frameTorque[k];
     double matrix[36] = {}, inverse[36], all[6] = {}, vector[6];
     addBlock(UNITY, 1, 0, matrix);
     addBlock(friction, 1/settings.stepSize, 3, matrix);

@@ -71,6 +71,8 @@ private:
         /** How far the fluid takes the centre, and turns the body. */
         double drift[3], spin[3];
         double metricTorque[3];
+        /** That of frames of chains, as it is known in an iteration. */
+        double frameTorque[3];
         /** How far the centre has moved, and the turn. */
         double moved[3], turned[3];
         /** The friction against turning half-way, and the noise of it. */

@@ -36,7 +36,8 @@ struct NetworkStep::Attempt {
 
 NetworkStep::NetworkStep(const ChainEngine& engine, const vector<Chain>& chains, const PackStepSource& beamEngine,
         const vector<BeamChain>& beams, const vector<RigidBody>& bodies, int particles) : engine(engine),
-        beamEngine(beamEngine), bodies(bodies), places(chains, beams, bodies, particles), moved(3*(size_t) particles) {
+        beamEngine(beamEngine), bodies(bodies), places(chains, beams, bodies, particles),
+        carried(chains, bodies), moved(3*(size_t) particles) {
 }
 
 NetworkStep::~NetworkStep() {
@@ -150,6 +151,8 @@ vector<bool> NetworkStep::findApart(const StepSettings& settings) const {
         return apart;
     for (const ImplicitCouplings* own : ofForces)
         own->findTouched(places, touched);
+    for (const pair<int, int>& frame : carried.findPairs())
+        touched[frame.first] = true;
     for (size_t chain = 0; chain < apart.size(); chain++)
         apart[chain] = apart[chain] && !touched[chain];
     return apart;
@@ -204,8 +207,10 @@ bool NetworkStep::takeStep(const Attempt& whole, double* displacements, vector<b
     return takeStep(part, displacements, failed, result);
 }
 
-bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<bool>& failed) {
+bool NetworkStep::attempt(const Attempt& given, double* displacements, vector<bool>& failed) {
     const int numPacks = steps.size();
+    Attempt attempt = given;
+    carried.begin(attempt.positions, attempt.box, attempt.settings);
     attempt.loop(numPacks, [&] (int pack) {
         const vector<int>& chains = chainsOfLanes[pack];
         for (size_t lane = 0; lane < chains.size(); lane++)
@@ -235,6 +240,7 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
     }
     for (ImplicitCouplings* own : couplings)
         own->findFailures(moved.data(), failed);
+    carried.findFailures(attempt.settings.stepSize, attempt.taken, failed);
     gaps.findFailures(failed);
     // Where couplings alone have not converged, nobody knows whose they are.
     if (!solved && find(failed.begin(), failed.end(), true) == failed.end())
@@ -242,6 +248,7 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
     attempt.loop(numPacks, [&] (int pack) {
         steps[pack]->getDisplacements(displacements);
     });
+    carried.follow(moved.data(), attempt.taken, attempt.settings);
     return find(failed.begin(), failed.end(), true) == failed.end();
 }
 
@@ -278,6 +285,8 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
         demands.tolerance = min(demands.tolerance, own->getRelativeTolerance());
     }
     for (int iteration = 0; iteration < NEWTON_ITERATIONS; iteration++) {
+        if (iteration > 0)
+            carried.update(moved.data());
         equations.clear();
         for (size_t i = 0; i < couplings.size(); i++) {
             first[i] = equations.size();
@@ -359,6 +368,8 @@ bool NetworkStep::finishIteration(const vector<size_t>& first) {
                 goingOn[chain] |= ofCouplings[pack] | unfinished[pack][lane];
                 any |= unfinished[pack][lane];
             }
+    for (const pair<int, int>& frame : carried.findPairs())
+        goingOn[places.getNumFilaments()+frame.second] |= goingOn[frame.first];
     return any;
 }
 
@@ -471,7 +482,9 @@ BrokenCoupling NetworkStep::findCulprit() const {
 }
 
 vector<bool> NetworkStep::findComponents(const vector<bool>& failed) const {
-    vector<pair<int, int> > pairs;
+    vector<pair<int, int> > pairs = carried.findPairs();
+    for (pair<int, int>& frame : pairs)
+        frame.second += places.getNumFilaments();
     for (const ImplicitCouplings* own : couplings)
         own->findNeighbours(pairs);
     vector<int> root(failed.size());

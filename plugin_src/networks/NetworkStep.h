@@ -3,6 +3,7 @@
 
 #include "dynamics/ChainEngine.h"
 #include "dynamics/PackStepSource.h"
+#include "networks/CarriedFrames.h"
 #include "networks/CoupledForces.h"
 #include "networks/ImplicitCouplings.h"
 #include <cstddef>
@@ -70,6 +71,7 @@ private:
     const PackStepSource& beamEngine;
     const std::vector<RigidBody>& bodies;
     ChainPlaces places;
+    CarriedFrames carried;
     /** Those of all forces, and what an attempt has in their place. */
     std::vector<ImplicitCouplings*> ofForces, couplings;
     /** Whether any are gaps, whether a step may resolve these, and whether this attempt does. */

@@ -10,7 +10,7 @@ from openmm_cylchain import Filaments, InputError
 from openmm_cylchain.engines.compiled import CylinderChainForce
 from support.contexts import positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
-from support.twisted_chains import DNA, SIGMAS, in_context
+from support.twisted_chains import DNA, SIGMAS, in_context, rates_of_turns
 
 STIFFNESS, FRICTION = DNA.twist_stiffness, DNA.axial_friction(VISCOSITY)
 SEGMENTS = 8
@@ -31,20 +31,8 @@ def chains_with_beads(count, temperature, minus="held", segments=(SEGMENTS,), to
     return filaments
 
 
-def equations():
-    """How fast turns of the segments of a straight chain, held at its minus end, and of its bead decay: a matrix."""
-    stiffness = np.zeros((SEGMENTS + 1, SEGMENTS + 1))
-    for joint in range(SEGMENTS + 1):
-        own = STIFFNESS * (2.0 if joint in (0, SEGMENTS) else 1.0)
-        gradient = np.zeros(SEGMENTS + 1)
-        gradient[joint] = 1.0
-        if joint > 0:
-            gradient[joint - 1] = -1.0
-        stiffness += own * np.outer(gradient, gradient)
-    return stiffness / np.append(np.full(SEGMENTS, FRICTION), BEAD)[:, None]
-
-
-RELAXATION = 1.0 / np.linalg.eigvals(equations()).real.min()
+RATES = rates_of_turns(SEGMENTS, plus=BEAD)
+RELAXATION = 1.0 / np.linalg.eigvals(RATES[1:, 1:]).real.min()
 """Of the bead, by the twist of its chain: 0.23 us."""
 
 
@@ -55,11 +43,10 @@ def test_bead_turns_back_as_it_must():
     twists = np.zeros(SEGMENTS + 1)
     twists[-1] = 0.1
     own.set_twists(0, twists)
-    begun = np.append(np.zeros(SEGMENTS), 0.1)
+    begun = np.append(0.0, np.cumsum(twists))
     for time in (0.5, 1.0, 1.5):
         context.getIntegrator().step(100)
-        turns = expm(-equations() * time * RELAXATION) @ begun
-        assert own.twists(0)._value == pytest.approx(np.diff(turns, prepend=0.0), rel=0.01)
+        assert own.twists(0)._value == pytest.approx(np.diff(expm(-RATES * time * RELAXATION) @ begun), rel=0.01)
 
 
 @pytest.mark.parametrize("step", [1e2, 1e4, 1e6])

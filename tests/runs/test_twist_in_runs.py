@@ -171,6 +171,31 @@ def test_bead_turns_against_its_friction(tmp_path):
     np.testing.assert_allclose(turns, end * (1.0 - np.exp(-time / relaxation)), atol=0.2 * end)
 
 
+BEAD = """
+[[body]]
+radius = "5 nm"
+positions = [["0 nm", "0 nm", "60 nm"]]
+direction = [1, 0, 0]
+points = [["0 nm", "0 nm", "-10 nm"], ["0 nm", "0 nm", "-15 nm"]]
+[[link]]
+between = [{ filament = 0, node = -1 }, { body = 0, body_point = 1 }]
+stiffness = "100 pN/nm"
+[[link]]
+between = [{ filament = 0, node = -2 }, { body = 0, body_point = 2 }]
+stiffness = "100 pN/nm"
+[[pull]]
+"""
+
+
+def test_bead_that_carries_a_frame_gives_way(tmp_path):
+    """A small one turns with the frame at the other end, which would keep half a turn between two that are held."""
+    text = WOUND.replace("count = 2", "count = 1").replace("[[pull]]\n", BEAD.lstrip(), 1)
+    text = text.replace('end = "plus"\n', 'end = "minus"\n').replace('end = "minus"', 'end = "plus"\nbody = 0', 1)
+    assert main(run_command(tmp_path, text)) == 0
+    turns = analysis.load(tmp_path / "out").twist["twist (turns)"]
+    assert np.abs(turns).max() > 0.1 and np.abs(turns[20:]).max() < 0.45
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -185,6 +210,7 @@ def test_bead_turns_against_its_friction(tmp_path):
         ('"3.141592653589793 1/us"', '"1 1/us"\ntorque = "8 pN nm"', "that is held"),
         ('"3.141592653589793 1/us"', '"1 1/us"\nrotational_friction = "3 pN nm us"', "that is held"),
         ('angular_velocity = "3.141592653589793 1/us"', 'rotational_friction = "0 pN nm us"', "rotational_friction"),
+        ('angular_velocity = "3.141592653589793 1/us"', "body = 0", "body 0 does not exist; there are 0"),
         ("direction = [0, 0, 1]\nangular", "direction = [0, 0, 0]\nangular", "direction"),
         ("seed = 3", 'seed = 3\nengine = "portable"', r"no \[\[end_frame\]\]|has no"),
         ('angular_velocity = "0 1/us"', "active = false", "active"),

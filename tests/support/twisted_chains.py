@@ -74,6 +74,22 @@ def assert_near(samples, exact, error=0.05):
     assert mean == pytest.approx(exact, abs=SIGMAS * deviation)
 
 
+def rates_of_turns(segments, minus=None, plus=None):
+    """How fast turns of a straight chain decay, that of a frame at either end among them: a matrix.
+
+    The frames have these frictions, and are held where there is none.
+    """
+    stiffness = np.zeros((segments + 2, segments + 2))
+    for joint in range(segments + 1):
+        gradient = np.zeros(segments + 2)
+        gradient[joint : joint + 2] = -1.0, 1.0
+        own = DNA.twist_stiffness * (2.0 if joint in (0, segments) else 1.0)
+        stiffness += own * np.outer(gradient, gradient)
+    frames = [np.inf if friction is None else friction for friction in (minus, plus)]
+    frictions = np.full(segments, DNA.axial_friction(VISCOSITY))
+    return stiffness / np.array([frames[0], *frictions, frames[1]])[:, None]
+
+
 def mean_square_angle_of_an_end(segments, time):
     """By which an end of a straight chain turns: of its discrete Rouse modes, and of the whole."""
     friction, stiffness = DNA.axial_friction(VISCOSITY), DNA.twist_stiffness

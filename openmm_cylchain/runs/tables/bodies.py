@@ -239,11 +239,16 @@ def with_bodies(groups, bodies):
     )
 
 
+def check_body(entries, bodies):
+    """Raise ConfigurationError unless a table with the key body names one of BodyGroups."""
+    count = sum(own.count for own in bodies)
+    if entries["body"] >= count:
+        raise entries.at("body").error(f"{entries['body']} does not exist; there are {count}, counted from 0.")
+
+
 def check_body_point(place, bodies):
     """Raise ConfigurationError unless a table with the keys body and body_point names a point of BodyGroups."""
-    count = sum(own.count for own in bodies)
-    if place["body"] >= count:
-        raise place.at("body").error(f"{place['body']} does not exist; there are {count}, counted from 0.")
+    check_body(place, bodies)
     points = len(group_of(place["body"], bodies).body.points)
     if place["body_point"] >= points:
         raise place.at("body_point").error(f"{place['body_point']} does not exist; there are {points}, from 0 on.")

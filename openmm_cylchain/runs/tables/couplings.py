@@ -21,7 +21,7 @@ from ..keys import (
     point,
 )
 from ..table import ACTIVE, TableKind, group_of
-from .bodies import check_body_point
+from .bodies import check_body, check_body_point
 
 CONTACTS = TableKind(
     "contacts",
@@ -133,6 +133,7 @@ END_FRAME = TableKind(
             0.0,
             "Of a frame that is held: radians per time, about the direction.",
         ),
+        Key("body", Whole(0, None, "0"), None, "Number of the body that carries the frame, counted from 0."),
     ),
     "What binds the material at an end of filaments with twist, such as a magnetic bead, see "
     "`Filaments.add_end_frame`; `twist.csv` has twist and torque of these filaments at every report.",
@@ -231,6 +232,7 @@ class EndFrameGroup:
     torque: float | None
     angular_velocity: float
     rotational_friction: float | None
+    body: int | None
 
 
 @dataclass(frozen=True)
@@ -280,9 +282,11 @@ def read_pull(entries, groups):
     return Pull(numbers, entries["tension"], entries["direction"], entries["node"], entries["force"])
 
 
-def read_end_frame(entries, groups):
+def read_end_frame(entries, groups, bodies):
     """The EndFrameGroup of an [[end_frame]] table."""
-    names = ("end", "direction", "torque", "angular_velocity", "rotational_friction")
+    names = ("end", "direction", "torque", "angular_velocity", "rotational_friction", "body")
+    if "body" in entries:
+        check_body(entries, bodies)
     return EndFrameGroup(_filaments(entries, groups), *(entries[name] for name in names))
 
 

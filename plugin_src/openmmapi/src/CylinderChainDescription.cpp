@@ -27,7 +27,7 @@ static void checkFriction(const cylchain::ChainList& chains) {
 }
 
 /** What twist is not for. */
-static void checkTwist(const cylchain::ChainList& chains) {
+static void checkTwist(const cylchain::ChainList& chains, int numBodies) {
     for (size_t index = 0; index < chains.getChains().size(); index++) {
         const cylchain::Chain& chain = chains.getChains()[index];
         if (!chain.twist.isPresent())
@@ -40,10 +40,14 @@ static void checkTwist(const cylchain::ChainList& chains) {
         if (chain.twist.isBentAtRest() && chain.twist.ends[0].angularVelocity != 0)
             throw OpenMMException("CylinderChainForce: "+name+" has bends at rest, which turn with the frame of its "
                     "first segment: turn the frame beyond its other end");
-        for (const cylchain::EndFrame& frame : chain.twist.ends)
-            if (chain.twist.isBentAtRest() && frame.friction > 0)
+        for (const cylchain::EndFrame& frame : chain.twist.ends) {
+            if (chain.twist.isBentAtRest() && (frame.friction > 0 || frame.body >= 0))
                 throw OpenMMException("CylinderChainForce: "+name+" has bends at rest, and no end frames that turn "
-                        "against a friction");
+                        "against a friction or with a body");
+            if (frame.body >= numBodies)
+                throw OpenMMException("CylinderChainForce: "+name+" has an end frame that body "+to_string(frame.body)+
+                        " carries, but there are "+to_string(numBodies)+" bodies");
+        }
     }
 }
 
@@ -77,7 +81,7 @@ CylinderChainDescription::CylinderChainDescription(const System& system, const C
         if (chains.getChain(number).twist.isPresent())
             throw OpenMMException("CylinderChainForce: "+chains.getName(number)+" has twist, and cannot grow");
     checkFriction(chains);
-    checkTwist(chains);
+    checkTwist(chains, bodies.size());
     lookForModes();
 }
 
@@ -131,7 +135,7 @@ void CylinderChainDescription::update(const CylinderChainForce& force) {
         present.visit(i, [&] (auto& chain) {chain.fixed = fixed;});
     }
     checkFriction(present);
-    checkTwist(present);
+    checkTwist(present, bodies.size());
     chains = move(present);
     lookForModes();
 }

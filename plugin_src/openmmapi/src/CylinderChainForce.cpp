@@ -373,6 +373,7 @@ void CylinderChainForce::setEndFrame(int chain, int end, const Vec3& direction, 
     frame.torque = torque;
     frame.angularVelocity = angularVelocity;
     frame.friction = friction;
+    frame.body = -1;
 }
 
 void CylinderChainForce::getEndFrame(int chain, int end, Vec3& direction, double& stiffness, double& torque,
@@ -384,6 +385,22 @@ void CylinderChainForce::getEndFrame(int chain, int end, Vec3& direction, double
     torque = frame.torque;
     angularVelocity = frame.angularVelocity;
     friction = frame.friction;
+}
+
+void CylinderChainForce::setEndFrameBody(int chain, int end, int body) {
+    cylchain::Chain& own = getChain(chain);
+    checkEnd(own, end);
+    cylchain::EndFrame& frame = own.twist.ends[end];
+    if (body < -1)
+        throw OpenMMException("CylinderChainForce: There is no body "+to_string(body));
+    if (body >= 0 && (frame.stiffness == 0 || frame.friction > 0))
+        throw OpenMMException("CylinderChainForce: A body can carry an end frame that is held alone");
+    frame.body = body;
+}
+
+int CylinderChainForce::getEndFrameBody(int chain, int end) const {
+    checkEnd(getChain(chain), end);
+    return getChain(chain).twist.ends[end].body;
 }
 
 void CylinderChainForce::getTwists(Context& context, int chain, vector<double>& twists) const {

@@ -37,7 +37,7 @@ static void writeTwist(SerializationNode& node, const ChainTwist& twist) {
                 .setDoubleProperty("y", frame.direction[1]).setDoubleProperty("z", frame.direction[2])
                 .setDoubleProperty("stiffness", frame.stiffness).setDoubleProperty("torque", frame.torque)
                 .setDoubleProperty("angularVelocity", frame.angularVelocity)
-                .setDoubleProperty("friction", frame.friction);
+                .setDoubleProperty("friction", frame.friction).setIntProperty("body", frame.body);
 }
 
 static void readTwist(const SerializationNode& node, CylinderChainForce& force, int chain) {
@@ -55,11 +55,13 @@ static void readTwist(const SerializationNode& node, CylinderChainForce& force, 
     force.setChainRestBends(chain, bends);
     int end = 0;
     for (auto& frame : node.getChildNode("Ends").getChildren()) {
-        if (!force.isChainClosed(chain))
+        if (!force.isChainClosed(chain)) {
             force.setEndFrame(chain, end, Vec3(frame.getDoubleProperty("x"), frame.getDoubleProperty("y"),
                     frame.getDoubleProperty("z")), frame.getDoubleProperty("stiffness"),
                     frame.getDoubleProperty("torque"), frame.getDoubleProperty("angularVelocity"),
                     frame.getDoubleProperty("friction", 0));
+            force.setEndFrameBody(chain, end, frame.getIntProperty("body", -1));
+        }
         end++;
     }
 }

@@ -306,6 +306,19 @@ public:
     void getEndFrame(int chain, int end, Vec3& direction, double& stiffness, double& torque,
             double& angularVelocity, double& friction) const;
     /**
+     * Let a rigid body carry a frame that is held: it turns with the body, which has the torque of its joint, and
+     * against it with its angular velocity.
+     *
+     * @param chain  the index of the chain
+     * @param end    as in setEndFrame(), which must have been called: its direction is that in the frame of the body
+     * @param body   the index of the body, or -1 if none carries the frame
+     */
+    void setEndFrameBody(int chain, int end, int body);
+    /**
+     * Get the index of the body that carries the frame beyond an end of a chain, or -1.
+     */
+    int getEndFrameBody(int chain, int end) const;
+    /**
      * Get the twists of a chain in a Context: the angle at each of its joints, from the frame before it to the one
      * behind it.  That of an open chain with N segments has N+1, the first and the last of which are those to the
      * frames beyond its ends; number j of a closed chain is that at node j.  They begin with those at rest, and stay
