@@ -92,6 +92,12 @@ struct StepSettings {
      */
     std::vector<std::vector<double> >* twists = NULL;
     std::vector<std::vector<double> >* twistChanges = NULL;
+    /**
+     * Where pieces of chains write these changes instead, and how far segments turn about themselves, in the place of
+     * the particle of the node at the joint or before the segment; NULL for whole chains.
+     */
+    double* twistChangesOfPieces = NULL;
+    double* turnsOfPieces = NULL;
     /** What hands do to the turns of each of these chains, each pair of segments once; NULL if none does. */
     const std::vector<std::vector<TurnedPair> >* turnedPairs = NULL;
     /**

@@ -5,6 +5,7 @@
 const cylchain::ChainKernels& cylchain::avx2Kernels() {
     static const ChainKernels kernels = {"avx2", CYLCHAIN_LANES, avx2::addForcesOfPack, avx2::stepOfPack,
             avx2::createStepOfPack, avx2::drawWordsOf, avx2::drawNormalsOf, avx2::drawFeneCoordinatesOf,
-            avx2::stepOfModesOfPack, avx2::transformCosinesOf, avx2WideKernels()};
+            avx2::stepOfModesOfPack, avx2::transformCosinesOf, avx2::findSweptAreaOf,
+            avx2WideKernels()};
     return kernels;
 }

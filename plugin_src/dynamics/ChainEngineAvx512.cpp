@@ -9,6 +9,7 @@
 const cylchain::ChainKernels& cylchain::avx512Kernels() {
     static const ChainKernels kernels = {"avx512", CYLCHAIN_LANES, avx512::addForcesOfPack, avx512::stepOfPack,
             avx512::createStepOfPack, avx512::drawWordsOf, avx512::drawNormalsOf, avx512::drawFeneCoordinatesOf,
-            avx512::stepOfModesOfPack, avx512::transformCosinesOf, avx512WideKernels()};
+            avx512::stepOfModesOfPack, avx512::transformCosinesOf, avx512::findSweptAreaOf,
+            avx512WideKernels()};
     return kernels;
 }

@@ -5,6 +5,7 @@
 const cylchain::ChainKernels& cylchain::baselineKernels() {
     static const ChainKernels kernels = {"baseline", CYLCHAIN_LANES, baseline::addForcesOfPack, baseline::stepOfPack,
             baseline::createStepOfPack, baseline::drawWordsOf, baseline::drawNormalsOf, baseline::drawFeneCoordinatesOf,
-            baseline::stepOfModesOfPack, baseline::transformCosinesOf, baselineWideKernels()};
+            baseline::stepOfModesOfPack, baseline::transformCosinesOf, baseline::findSweptAreaOf,
+            baselineWideKernels()};
     return kernels;
 }

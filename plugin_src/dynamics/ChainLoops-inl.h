@@ -152,6 +152,13 @@ Instability stepOfModesOfPack(const ModePack<Scalar>& modes, const double* posit
     });
 }
 
+double findSweptAreaOf(const double* a, const double* b, const double* newA, const double* newB) {
+    auto swept = [] (const double* v) -> SweptVector<double> {
+        return {{v[0], v[1], v[2]}, std::sqrt(v[0]*v[0]+v[1]*v[1]+v[2]*v[2])};
+    };
+    return sweptArea<double>(swept(a), swept(b), swept(newA), swept(newB));
+}
+
 #endif
 
 } // namespace CYLCHAIN_LOOPS

@@ -162,6 +162,11 @@ struct ChainKernels {
             const double* box, const StepSettings& settings, double* displacements);
     /** See CosineTables.h. */
     void (*transformCosines)(int length, int count, double* values, bool inverse);
+    /**
+     * The area on the unit sphere that the great circle from a to b sweeps as it moves to that from newA to newB, for
+     * the directions of these vectors, of three numbers each.
+     */
+    double (*findSweptArea)(const double* a, const double* b, const double* newA, const double* newB);
     const WideKernels& wide;
 };
 

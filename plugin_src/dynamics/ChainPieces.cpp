@@ -1,4 +1,6 @@
 #include "dynamics/ChainPieces.h"
+#include "dynamics/PackFilling.h"
+#include "mechanics/PeriodicBox.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -24,6 +26,8 @@ const double LEAST_GAIN = 3;
  */
 const double SEGMENTS_MAY_DIFFER = 0.003, LINEAR_BENDS_MAY_DIFFER = 0.009, NODES_MAY_DIFFER = 0.03;
 const double TIGHTER_FOR_STAGES = 0.3;
+/** The same of how far segments turn about themselves, in rad. */
+const double TURNS_MAY_DIFFER = 0.003;
 
 /** A piece of a chain, with particles of its own. */
 Chain pieceOf(const Chain& chain, int first, int nodes, int firstParticle, PieceOfChain& origin) {
@@ -37,6 +41,17 @@ Chain pieceOf(const Chain& chain, int first, int nodes, int firstParticle, Piece
     piece.stretching = chain.stretching;
     piece.nodeFriction = chain.nodeFriction;
     piece.planar = chain.planar;
+    if (chain.twist.isPresent()) {
+        const ChainTwist& twist = chain.twist;
+        ChainTwist& own = piece.twist;
+        own.stiffness.assign(twist.stiffness.begin()+first, twist.stiffness.begin()+first+nodes-2);
+        own.rest.assign(twist.rest.begin()+first, twist.rest.begin()+first+nodes-2);
+        own.friction.assign(twist.friction.begin()+first, twist.friction.begin()+first+nodes-1);
+        if (first == 0)
+            own.ends[0] = twist.ends[0];
+        if (first+nodes == (int) chain.nodes.size())
+            own.ends[1] = twist.ends[1];
+    }
     for (size_t number = 0; number < chain.tethers.size(); number++) {
         Tether tether = chain.tethers[number];
         tether.node -= first;
@@ -77,6 +92,8 @@ struct ChainPieces::Cut {
     /** Pieces of all chains, in their order; each of them has its own particles, which follow those of the last. */
     unique_ptr<ChainEngine> engine;
     vector<double> positions, forces, displacements;
+    /** One for each node of each piece: see StepSettings. */
+    vector<double> twistChanges, turns;
 };
 
 ChainPieces::ChainPieces(const vector<Chain>& all, const vector<int>& members, int lanes, int wideLanes) :
@@ -90,7 +107,7 @@ ChainPieces::~ChainPieces() {
 }
 
 ChainPieces::Response ChainPieces::responseOf(const vector<Chain>& chains) {
-    Response result = {HUGE_VAL, HUGE_VAL, 0, 0, 0, 0, chains[0].planar ? 1 : 2};
+    Response result = {HUGE_VAL, HUGE_VAL, 0, 0, 0, 0, 0, HUGE_VAL, chains[0].planar ? 1 : 2};
     // The segments at the ends may be unlike all others, and no piece ends there.
     for (const Chain& chain : chains)
         for (size_t s = 1; s+1 < chain.segments.size(); s++) {
@@ -104,6 +121,10 @@ ChainPieces::Response ChainPieces::responseOf(const vector<Chain>& chains) {
             result.lengthFriction = max(result.lengthFriction, segment.extensional/(length*length));
             result.bend = max(result.bend, linear ? joint : joint/square);
             result.angle = max(result.angle, linear ? joint*square : joint);
+            if (chain.twist.isPresent()) {
+                result.twist = max(result.twist, chain.twist.stiffness[s-1]);
+                result.turn = min(result.turn, chain.twist.friction[s]);
+            }
         }
     return result;
 }
@@ -115,7 +136,10 @@ double ChainPieces::Response::decayLength(const StepSettings& settings) const {
     const double bends = min(2.0, dimensions*settings.kT/angle);
     const double node = 1/(friction+2*sqrt(2.0)*pow(friction, 0.75)*pow(bend, 0.25));
     const double ofTension = 1/sqrt(along/h*(1/(length+lengthFriction/h)+bends*node));
-    return max(ofTension, sqrt(2.0)*pow(bend/friction, 0.25));
+    // Turns by a torque solve the difference equation of a chain of joints. Written so that NaN goes on.
+    const double joint = max(0.5, 1-turn/(4*h*twist))*twist;
+    const double ofTwist = twist > 0 ? 1/acosh(1+0.5*turn/(h*joint)) : 0;
+    return max(max(ofTension, ofTwist), sqrt(2.0)*pow(bend/friction, 0.25));
 }
 
 PieceLayout ChainPieces::layoutFor(int nodes, int chains, int overlap, int lanes) {
@@ -132,7 +156,7 @@ double ChainPieces::costOf(const PieceLayout& layout, int chains, int lanes) {
 bool ChainPieces::mayBeUsed(const vector<Chain>& chains, const vector<int>& members, int wideLanes) {
     const Chain& longest = chains[members[0]];
     const int nodes = longest.nodes.size(), count = members.size();
-    return !longest.closed && !longest.twist.isPresent() &&
+    return !longest.closed && !longest.twist.isBentAtRest() &&
             LEAST_GAIN*costOf(layoutFor(nodes, count, LEAST_SHARED, wideLanes), count, wideLanes) <= nodes;
 }
 
@@ -151,7 +175,7 @@ int ChainPieces::overlapFor(const StepSettings& settings) const {
 
 bool ChainPieces::isUsed(const StepSettings& settings) const {
     // In a periodic flow, all of a chain belongs to the image of its first node.
-    if (!isImplicit(settings.scheme) || settings.segmentForces != NULL ||
+    if (!isImplicit(settings.scheme) || settings.segmentForces != NULL || settings.turnedPairs != NULL ||
             (settings.flow.present && settings.flow.box != NULL))
         return false;
     const int longest = chains[0].nodes.size(), count = chains.size(), lanes = lanesOfStep(settings);
@@ -181,6 +205,8 @@ ChainPieces::Cut& ChainPieces::cutFor(const StepSettings& settings) {
     cut->engine.reset(new ChainEngine(pieces, origins));
     for (vector<double>* values : {&cut->positions, &cut->forces, &cut->displacements})
         values->resize(3*(size_t) particles);
+    for (vector<double>* values : {&cut->twistChanges, &cut->turns})
+        values->resize(chains[0].twist.isPresent() ? particles : 0);
     return *cut;
 }
 
@@ -217,6 +243,8 @@ bool ChainPieces::step(const double* positions, const double* forces, const doub
 
     StepSettings undivided = settings;
     undivided.mayDivide = false;
+    undivided.twistChangesOfPieces = own.twistChanges.data();
+    undivided.turnsOfPieces = own.turns.data();
     result = Instability();
     for (int pack : own.engine->getPacksOfStep(settings)) {
         const Instability found = own.engine->step(pack, own.positions.data(), own.forces.data(), box, undivided,
@@ -244,6 +272,49 @@ bool ChainPieces::step(const double* positions, const double* forces, const doub
             for (int node = begin; node < layout.nodesOfPiece; node++)
                 copy_n(found+3*node, 3, displacements+3*chains[i].nodes[first+node]);
         }
+        const size_t firstPlace = place/3-(size_t) layout.pieces*layout.nodesOfPiece;
+        if (chains[i].twist.isPresent() && !joinTwists(chains[i], layout, own.overlap, &own.twistChanges[firstPlace],
+                &own.turns[firstPlace], positions, box, displacements, (*settings.twistChanges)[numbers[i]]))
+            return false;
+    }
+    return true;
+}
+
+bool ChainPieces::joinTwists(const Chain& chain, const PieceLayout& layout, int overlap, const double* ofPieces,
+        const double* turns, const double* positions, const double* box, const double* displacements,
+        vector<double>& changes) {
+    auto findSegment = [&] (int s, double* vector, double* newVector) {
+        const int a = 3*chain.nodes[s], b = 3*chain.nodes[s+1];
+        for (int k = 0; k < 3; k++)
+            vector[k] = positions[b+k]-positions[a+k];
+        if (box != NULL)
+            takeToNearestImage(vector, box);
+        for (int k = 0; k < 3; k++)
+            newVector[k] = vector[k]+(displacements[b+k]-displacements[a+k]);
+    };
+    for (int piece = 0; piece < layout.pieces; piece++) {
+        const int nodes = layout.nodesOfPiece, first = layout.firstNode(piece);
+        const double* const own = turns+(size_t) piece*nodes-first;
+        int begin = first;
+        if (piece > 0) {
+            const double* const before = turns+(size_t) (piece-1)*nodes-layout.firstNode(piece-1);
+            const int joined = layout.firstJoined(piece, overlap), end = layout.endOfJoined(piece, overlap);
+            const int middle = (joined+end)/2;
+            begin = end+1;
+            double vectors[2][3], newVectors[2][3];
+            findSegment(joined-2, vectors[0], newVectors[0]);
+            for (int s = joined-1; s < begin; s++) {
+                const int here = (s-joined) & 1, other = 1-here;
+                findSegment(s, vectors[here], newVectors[here]);
+                // Written so that NaN is too much.
+                if (!(fabs(own[s]-before[s]) <= TURNS_MAY_DIFFER))
+                    return false;
+                changes[s] = (s < middle ? before : own)[s]-(s-1 < middle ? before : own)[s-1]+
+                        bestKernels().findSweptArea(vectors[other], vectors[here], newVectors[other], newVectors[here]);
+            }
+        }
+        const double* const found = ofPieces+(size_t) piece*nodes;
+        copy(found+(begin-first), found+nodes, changes.begin()+begin);
     }
     return true;
 }

@@ -24,6 +24,8 @@ struct PieceLayout {
  * are cut into pieces that overlap, with ends that are free. The pieces lie side by side in lanes, and stay in the
  * cache. Where two of them overlap, displacements pass from those of one piece to those of the other. The step is not
  * taken so if these differ there by more than an iteration may leave, or if the equations of a piece are not solved.
+ * Twists follow from how far segments turn, which passes from one piece to the other at once, and from the areas that the
+ * joined displacements sweep: so linking numbers are kept.
  * See docs/design/implicit_scheme.md.
  */
 class ChainPieces {
@@ -58,7 +60,7 @@ public:
 private:
     /** What the decay along a chain follows from: the least frictions of nodes, and the greatest stiffnesses. */
     struct Response {
-        double along, across, length, lengthFriction, bend, angle;
+        double along, across, length, lengthFriction, bend, angle, twist, turn;
         int dimensions;
         /** The number of nodes in which what a force does decays by a factor of e. */
         double decayLength(const StepSettings& settings) const;
@@ -91,6 +93,16 @@ private:
      */
     static bool join(const Chain& chain, int first, int count, Scheme scheme, const double* before,
             const double* behind, double* displacements);
+    /**
+     * Find how the twists of a chain change when displacements have been joined, or return false if segments turn by too
+     * different angles in two pieces.
+     *
+     * @param ofPieces  changes of the twists of its first piece, which those of the others follow
+     * @param turns     the same of how far segments turn
+     */
+    static bool joinTwists(const Chain& chain, const PieceLayout& layout, int overlap, const double* ofPieces,
+            const double* turns, const double* positions, const double* box, const double* displacements,
+            std::vector<double>& changes);
 };
 
 } // namespace cylchain

@@ -88,7 +88,7 @@ template <int W> void gatherTwists(const Pack& pack, const std::vector<std::vect
     for (int node = 0; node < numTwists(pack); node++)
         twists[node] = typename Lanes<W>::Type {};
     forTwists<W>(pack, [&] (int chain, int joint, int node, int i) {
-        lane(twists[node], i) = ofChains[chain][joint]-pack.twist.rest[node*W+i];
+        lane(twists[node], i) = ofChains[chain][pack.firstNode[i]+joint]-pack.twist.rest[node*W+i];
     });
 }
 
@@ -97,7 +97,9 @@ template <int W> void scatterTwists(const Pack& pack, const StepSettings& settin
             const typename DoubleLanes<W>::Type* changes, const bool* taken) {
     const double* const all = reinterpret_cast<const double*>(changes);
     forTwists<W>(pack, [&] (int chain, int joint, int node, int i) {
-        if (taken == NULL || taken[i])
+        if (settings.twistChangesOfPieces != NULL)
+            settings.twistChangesOfPieces[pack.particles[node*W+i]] = all[node*W+i];
+        else if (taken == NULL || taken[i])
             (*settings.twistChanges)[chain][joint] = all[node*W+i];
     });
 }

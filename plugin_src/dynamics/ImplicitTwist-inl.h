@@ -187,6 +187,10 @@ public:
             }
             reinterpret_cast<double*>(changes+s*REGISTERS)[i] += turn;
         });
+        for (int s = 0; s < segments && step.settings.turnsOfPieces != NULL; s++)
+            for (int i = 0; i < W; i++)
+                if (pack.particles[s*W+i] >= 0)
+                    step.settings.turnsOfPieces[pack.particles[s*W+i]] = lane(joints[s].turn, i);
     }
 private:
     ImplicitState<W>& step;

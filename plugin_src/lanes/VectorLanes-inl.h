@@ -29,19 +29,22 @@ template <> struct Lanes<1> {
     typedef Word Bits;
 };
 
-/** The number in each lane. */
+/** The number in each lane, and how many lanes there are. */
 template <class Real> struct OfLane {
     typedef std::remove_reference_t<decltype(Real{}[0])> Type;
+    static constexpr int COUNT = sizeof(Real)/sizeof(Type);
 };
 template <> struct OfLane<float> {
     typedef float Type;
+    static constexpr int COUNT = 1;
 };
 template <> struct OfLane<double> {
     typedef double Type;
+    static constexpr int COUNT = 1;
 };
 template <class Real> using NumberOf = typename OfLane<Real>::Type;
 
-template <class Real> constexpr int LANE_COUNT = sizeof(Real)/sizeof(NumberOf<Real>);
+template <class Real> constexpr int LANE_COUNT = OfLane<Real>::COUNT;
 
 template <class Real> CYLCHAIN_INLINE NumberOf<Real>& lane(Real& value, int i) {
     return reinterpret_cast<NumberOf<Real>*>(&value)[i];

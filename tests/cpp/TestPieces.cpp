@@ -5,8 +5,11 @@
 
 #include "TestChains.h"
 #include "dynamics/ChainPieces.h"
+#include "dynamics/PackFilling.h"
 #include <algorithm>
+#include <array>
 #include <functional>
+#include <numeric>
 
 static const double KT = 2.5;
 static const int LANES = 8, WIDE_LANES = 16;
@@ -193,6 +196,77 @@ static void testStepsAreThoseOfWholeChains() {
     checkChain("tethered chain", chain, 1e6);
 }
 
+/** DNA in segments of 5 nm, whose ends are free, held, or turn against a friction. */
+static Case twistedDna(int segments, double h, const char* ends = "free") {
+    const Segment segment = {5, 2062, 0, 40300, 35900, 287000, 84000};
+    Chain chain = chainOf(segments, segment, 25, BendingModel::KratkyPorod);
+    chain.twist.stiffness.assign(segments-1, 50);
+    chain.twist.rest.assign(segments-1, 0.2);
+    chain.twist.friction.assign(segments, 64700);
+    for (EndFrame& frame : chain.twist.ends) {
+        const bool turns = string(ends) == "turning";
+        if (string(ends) == "free")
+            continue;
+        frame.direction[0] = 1;
+        frame.stiffness = 100;
+        frame.friction = turns ? 1e6 : 0;
+        (turns ? frame.torque : frame.angularVelocity) = turns ? 10 : 1e-7;
+    }
+    return {"twisted "+string(ends), chain, h};
+}
+
+/**
+ * Twists of a chain in pieces are those of a whole one, and their sum changes by the areas that tangents have swept, and
+ * by the turns of frames that are held, to rounding.
+ */
+static void checkTwists(const Case& own, Precision precision, const double* box = NULL) {
+    const Chain& chain = own.chain;
+    const size_t segments = chain.segments.size();
+    ChainPieces pieces({chain}, {0}, LANES, WIDE_LANES);
+    const ChainEngine whole = wholeChains({chain});
+    const Array x = positionsOf(chain, 4), f(x.size());
+    NormalNumbers normalNumbers(6);
+    // Wound by a few k_B T of torque.
+    Array twists = normalNumbers(segments+1);
+    for (double& twist : twists)
+        twist = 0.4+0.2*twist;
+    vector<Array> ofChains = {twists}, changes = {Array(segments+1)};
+    StepSettings settings = settingsFor(own.h, precision);
+    settings.twists = &ofChains;
+    settings.twistChanges = &changes;
+    check(pieces.isUsed(settings), own.name+" is not cut");
+    Array found(x.size()), expected(x.size());
+    Instability result;
+    check(pieces.step(x.data(), f.data(), box, settings, found.data(), result), own.name+": pieces differ");
+    const Array ofPieces = changes[0];
+    settings.precision = Precision::Double;
+    whole.step(0, x.data(), f.data(), box, settings, expected.data());
+    for (size_t joint = 0; joint <= segments; joint++)
+        checkClose(changes[0][joint], ofPieces[joint], 0.003, 2, own.name+": twist");
+    if (chain.twist.ends[0].stiffness == 0 || chain.twist.ends[0].friction > 0)
+        return;
+    double sum = 0;
+    array<double, 3> tangents[2] = {{1, 0, 0}, {1, 0, 0}};
+    for (size_t s = 0; s <= segments; s++) {
+        array<double, 3> next[2] = {{1, 0, 0}, {1, 0, 0}};
+        for (int k = 0; k < 3 && s < segments; k++) {
+            next[0][k] = x[3*s+3+k]-x[3*s+k];
+            next[1][k] = next[0][k]+(found[3*s+3+k]-found[3*s+k]);
+        }
+        sum += bestKernels().findSweptArea(tangents[0].data(), next[0].data(), tangents[1].data(), next[1].data());
+        copy_n(next, 2, tangents);
+    }
+    // Both frames turn in the same way.
+    checkClose(sum, accumulate(ofPieces.begin(), ofPieces.end(), 0.0), 1e-12, 10, own.name+": sum of twists");
+}
+
+static void testTwist() {
+    for (Precision precision : {Precision::Double, Precision::Automatic})
+        for (const char* ends : {"free", "held", "turning"})
+            for (double h : {100.0, 1000.0})
+                checkTwists(twistedDna(1500, h, ends), precision);
+}
+
 static void testFlowAndPeriodicBox() {
     const Case own = actin(1500);
     const Array x = positionsOf(own.chain, 1), f = someForces(x, 0);
@@ -267,7 +341,15 @@ static void testWhichChainsAreCut() {
     Case ring = dna(10000);
     ring.chain.closed = true;
     check(!isCut(ring, 1557), "ring");
+    check(isCut(twistedDna(400, 1000), 1000) && !isCut(twistedDna(400, 1e5), 1e5), "chain that is wound");
+    Case bent = twistedDna(400, 1000);
+    bent.chain.twist.bends.assign(2*bent.chain.joints.size(), 0.1);
+    check(!isCut(bent, 1000), "chain with bends at rest");
     StepSettings settings = settingsFor(1557, Precision::Automatic);
+    const vector<vector<TurnedPair> > pairs(1);
+    settings.turnedPairs = &pairs;
+    check(!ChainPieces({twistedDna(400, 1000).chain}, {0}, LANES, WIDE_LANES).isUsed(settings), "hands on the helix");
+    settings.turnedPairs = NULL;
     vector<vector<SegmentForces> > recorded;
     settings.segmentForces = &recorded;
     check(!ChainPieces({dna(10000).chain}, {0}, LANES, WIDE_LANES).isUsed(settings), "step that is recorded");
@@ -395,6 +477,7 @@ static void testEnergiesWherePiecesAreJoined() {
 int main() {
     return runTests({
         testStepsAreThoseOfWholeChains,
+        testTwist,
         testFlowAndPeriodicBox,
         testChainsOfAPack,
         testChainsOfAnEngine,
