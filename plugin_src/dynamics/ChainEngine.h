@@ -101,8 +101,8 @@ struct StepSettings {
     /** What hands do to the turns of each of these chains, each pair of segments once; NULL if none does. */
     const std::vector<std::vector<TurnedPair> >* turnedPairs = NULL;
     /**
-     * For each of these chains, where the frames beyond both ends point, six numbers, if rigid bodies carry any of them;
-     * none for others. NULL if there are no such bodies.
+     * For each of these chains, where the frames beyond both ends point, six numbers, if rigid bodies carry any of
+     * them; none for others. NULL if there are no such bodies.
      */
     const std::vector<std::vector<double> >* endDirections = NULL;
     /** Where to write the torques of the joints to these frames at the end of the step: two numbers for each chain. */

@@ -24,9 +24,8 @@ struct PieceLayout {
  * are cut into pieces that overlap, with ends that are free. The pieces lie side by side in lanes, and stay in the
  * cache. Where two of them overlap, displacements pass from those of one piece to those of the other. The step is not
  * taken so if these differ there by more than an iteration may leave, or if the equations of a piece are not solved.
- * Twists follow from how far segments turn, which passes from one piece to the other at once, and from the areas that the
- * joined displacements sweep: so linking numbers are kept.
- * See docs/design/implicit_scheme.md.
+ * Twists follow from how far segments turn, which passes from one piece to the other at once, and from the areas that
+ * the joined displacements sweep: so linking numbers are kept. See docs/design/implicit_scheme.md.
  */
 class ChainPieces {
 public:
@@ -94,8 +93,8 @@ private:
     static bool join(const Chain& chain, int first, int count, Scheme scheme, const double* before,
             const double* behind, double* displacements);
     /**
-     * Find how the twists of a chain change when displacements have been joined, or return false if segments turn by too
-     * different angles in two pieces.
+     * Find how the twists of a chain change when displacements have been joined, or return false if segments turn by
+     * too different angles in two pieces.
      *
      * @param ofPieces  changes of the twists of its first piece, which those of the others follow
      * @param turns     the same of how far segments turn

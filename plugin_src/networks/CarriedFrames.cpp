@@ -153,6 +153,7 @@ void CarriedFrames::findFailures(double stepSize, const vector<bool>& taken, vec
 
 vector<pair<int, int> > CarriedFrames::findPairs() const {
     vector<pair<int, int> > pairs;
+    pairs.reserve(frames.size());
     for (const Frame& frame : frames)
         pairs.emplace_back(frame.chain, frame.body);
     return pairs;

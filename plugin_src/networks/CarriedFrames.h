@@ -13,11 +13,12 @@ namespace cylchain {
  * Frames beyond ends of chains with twist that rigid bodies carry.
  *
  * The joint between a frame with the direction a and the segment with the direction b behind it has the twist m, which
- * changes by (w_b-w_a).(a+b)/(1+a.b) as both turn by w. So its torque T = (stiffness) m is that of the couple
- * T (a+b)/(1+a.b) on the body and the opposite one on the segment. In a step, or a part of it, the chain takes the frame
- * for one that stands still, and the body has the torque that this leads to; then the frame turns with the body. Each of
- * both keeps equilibrium, but that the torque does not change while it turns the body: with a = (stiffness) h/(friction
- * of the body against turning), the square of the twist is by a^2 of it too large. So steps are divided where a is large.
+ * changes by (w_b-w_a).(a+b)/(1+a.b) as both turn by w. So its torque T = (stiffness) m is that of the couple T
+ * (a+b)/(1+a.b) on the body and the opposite one on the segment. In a step, or a part of it, the chain takes the frame
+ * for one that stands still, and the body has the torque that this leads to; then the frame turns with the body. Each
+ * of both keeps equilibrium, but that the torque does not change while it turns the body: with a = (stiffness)
+ * h/(friction of the body against turning), the square of the twist is by a^2 of it too large. So steps are divided
+ * where a is large.
  */
 class CarriedFrames {
 public:

@@ -216,8 +216,8 @@ static Case twistedDna(int segments, double h, const char* ends = "free") {
 }
 
 /**
- * Twists of a chain in pieces are those of a whole one, and their sum changes by the areas that tangents have swept, and
- * by the turns of frames that are held, to rounding.
+ * Twists of a chain in pieces are those of a whole one, and their sum changes by the areas that tangents have swept,
+ * and by the turns of frames that are held, to rounding.
  */
 static void checkTwists(const Case& own, Precision precision, const double* box = NULL) {
     const Chain& chain = own.chain;
