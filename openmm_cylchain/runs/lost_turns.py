@@ -35,9 +35,8 @@ class LostTurns:
 
     def look(self, context: openmm.Context) -> None:
         """Issue a TwistWarning for each filament that has lost or won more than a turn since it was looked at last."""
-        time, here = context.getTime()._value, self._filaments.in_context(context)
-        for number, speed in self._speeds.items():
-            linking = here.linking_number(number)
+        time, found = context.getTime()._value, self._filaments.in_context(context).linking_numbers([*self._speeds])
+        for (number, speed), linking in zip(self._speeds.items(), found):
             begun, before = self._last.get(number, (time, linking))
             self._last[number] = (time, linking)
             lost = before + speed * (time - begun) - linking

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -370,12 +371,18 @@ class FilamentsInContext:
         InputError
             For a filament that does not exist, has no twist, lacks a frame at an end, or has one that a body carries.
         """
+        return self.linking_numbers([filament])[0]
+
+    def linking_numbers(self, filaments: Sequence[int]) -> list[float]:
+        """``linking_number`` of several filaments at once, for which positions are fetched once."""
+        positions = self._context.getState(positions=True).getPositions(asNumpy=True)._value
+        return [self._linking_number(self._twisted(filament), positions) for filament in filaments]
+
+    def _linking_number(self, number, positions):
         # Analysis takes long to load.
         from ..analysis.linking import writhe
 
-        number = self._twisted(filament)
         own = self._placed.filaments[number]
-        positions = self._context.getState(positions=True).getPositions(asNumpy=True)._value
         nodes = positions[self._placed.node_indices[number]]
         if not own.closed:
             frames = {frame.end: frame for frame in self._placed.end_frames if frame.filament == number}
