@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from openmm_cylchain import Body, Crosslinks, Filaments, InputError, RestBends
 from openmm_cylchain.engines.compiled import CylinderChainForce
 from support.contexts import new_context, positions_of
+from support.platforms import ON_COMPILED_PLATFORMS
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 from support.twisted_chains import DNA, LENGTH, SIGMAS, in_context, mean_and_error, rates_of_turns
 
@@ -36,7 +37,7 @@ def straight_chain_between_bodies(ends, orientation=None, planar=False):
     return filaments
 
 
-@pytest.mark.parametrize("platform", ["Reference", "CPU"])
+@ON_COMPILED_PLATFORMS
 @pytest.mark.parametrize("share", [0.005, 2.0])
 @pytest.mark.parametrize("ends", [("plus",), ("minus",), ("minus", "plus")])
 def test_bodies_turn_back_as_they_must(ends, share, platform):
@@ -44,7 +45,7 @@ def test_bodies_turn_back_as_they_must(ends, share, platform):
 
     In steps that are longer than those in which its joint would turn a body by itself, too, which are divided.
     """
-    planar = platform == "CPU"
+    planar, steps = platform.name == "CPU", max(4, round(0.2 / share))
     filaments = straight_chain_between_bodies(ends, None if planar else ORIENTATION, planar)
     context, own = in_context(filaments, share * BY_ITSELF, platform=platform)
     rates = rates_of_turns(SEGMENTS, *(FRICTION if end in ends else None for end in ("minus", "plus")))
@@ -52,9 +53,9 @@ def test_bodies_turn_back_as_they_must(ends, share, platform):
     twists[[0, -1]] = 0.05
     own.set_twists(0, twists)
     angles = np.append(0.0, np.cumsum(twists))
-    turns = expm(-rates * 4 * share * BY_ITSELF) @ angles
+    turns = expm(-rates * steps * share * BY_ITSELF) @ angles
     before = positions_of(context)
-    context.getIntegrator().step(4)
+    context.getIntegrator().step(steps)
     # A body turns when its chain has.
     assert own.twists(0)._value == pytest.approx(np.diff(turns), rel=0.01 if share < 1.0 else 0.1)
     after = positions_of(context)
