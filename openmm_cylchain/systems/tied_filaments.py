@@ -8,6 +8,8 @@ from dataclasses import replace
 from typing import Any
 from weakref import WeakKeyDictionary
 
+import numpy as np
+
 from ..couplings.shapes import Shape
 from ..engines.protocol import PlacedFilaments
 from ..errors import InputError
@@ -25,6 +27,9 @@ from ..kinetics.linkers import Linkers, as_linkers, warn_if_springs_do_not_fit
 from ..units.quantities import LENGTH, STIFFNESS, non_negative, positive, shown, vector, whole_number
 from ..units.types import Indices, IntArray, Scalar, Vector, Vectors
 from .added_filaments import AddedFilaments
+
+_AGAINST = -0.9
+"""The cosine from which on the direction of an end frame is against its filament, where its joint has no twist."""
 
 
 class TiedFilaments(AddedFilaments):
@@ -173,8 +178,8 @@ class TiedFilaments(AddedFilaments):
         ------
         InputError
             For a filament, an end or a body that does not exist, a ring, a filament without twist, a second frame, a
-            friction that is not positive, an angular velocity of a frame that is not held, or a torque or friction of
-            one that a body carries.
+            direction against the filament, a friction that is not positive, an angular velocity of a frame that is not
+            held, or a torque or friction of one that a body carries.
 
         Examples
         --------
@@ -207,6 +212,12 @@ class TiedFilaments(AddedFilaments):
         if own.rest_bends is not None and (frame.body, frame.rotational_friction) != (None, None):
             raise InputError(
                 f"{label}: filament {number} has rest_bends, and its frames cannot have a friction or a body yet."
+            )
+        last = np.diff(own.positions[:2] if frame.end == "minus" else own.positions[-2:], axis=0)[0]
+        if last @ np.array(frame.direction) < _AGAINST * np.linalg.norm(last):
+            raise InputError(
+                f"{label}: the direction points against filament {number} at its {frame.end} end: it must be that from "
+                "minus to plus, at both ends."
             )
         if any(other.filament == number and other.end == end for other in self._end_frames):
             raise InputError(f"{label}: the {end} end of filament {number} has a frame already.")

@@ -242,6 +242,7 @@ def test_recommended_step_knows_what_twist_turns():
         ({"body": -1}, "body"),
         ({"body": "bead"}, "body"),
         ({"body": 0, "torque": KT}, "turns with it"),
+        ({"body": 0, "direction": [0, 0.1, -1]}, "against filament 0 at its plus end"),
         ({"body": 0, "rotational_friction": 1.0}, "turns with it"),
     ],
 )
@@ -250,7 +251,7 @@ def test_bad_frames_are_refused(options, message):
     filaments.add_body(Body.sphere(RADIUS), [0, 0, 0])
     filaments.add_straight(DNA, 4, [0, 0, 0], [0, 0, 1])
     with pytest.raises(InputError, match=message):
-        filaments.add_end_frame(0, "plus", [0, 0, 1], **options)
+        filaments.add_end_frame(0, "plus", **{"direction": [0, 0, 1], **options})
 
 
 def test_joints_that_are_bent_at_rest_are_refused():
