@@ -20,7 +20,6 @@ RADIUS = 10.0
 FRICTION = float(Body.sphere(RADIUS).rotational_friction(VISCOSITY)[0, 0])
 BY_ITSELF = FRICTION / (2.0 * DNA.twist_stiffness)
 """The time in which the joint to its frame alone would turn a body: 0.25 us."""
-RELAXATION = 16.0 * BY_ITSELF
 POINTS = RADIUS * np.eye(3)
 ORIENTATION = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 
@@ -35,6 +34,13 @@ def straight_chain_between_bodies(ends, orientation=None, planar=False):
     for end in ("minus", "plus"):
         filaments.add_end_frame(0, end, [0, 0, 1], body=ends.index(end) if end in ends else None)
     return filaments
+
+
+def turned_about_z(before, after):
+    """The angle by which a body has turned, from the positions of its particles."""
+    arms = [(positions[1:3] - positions[0])[:, :2] for positions in (before, after)]
+    across = arms[0][:, 0] * arms[1][:, 1] - arms[0][:, 1] * arms[1][:, 0]
+    return np.arctan2(across.sum(), np.sum(arms[0] * arms[1]))
 
 
 @ON_COMPILED_PLATFORMS
@@ -60,14 +66,13 @@ def test_bodies_turn_back_as_they_must(ends, share, platform):
     assert own.twists(0)._value == pytest.approx(np.diff(turns), rel=0.01 if share < 1.0 else 0.1)
     after = positions_of(context)
     for particles, number in zip(filaments.body_indices, [0 if end == "minus" else -1 for end in ends]):
-        arms = [x[particles[1:3]] - x[particles[0]] for x in (before, after)]
-        across, along = np.cross(arms[0], arms[1])[:, 2].sum(), np.sum(arms[0][:, :2] * arms[1][:, :2])
-        assert np.arctan2(across, along) == pytest.approx((turns - angles)[number], rel=0.01)
+        turned = turned_about_z(before[particles], after[particles])
+        assert turned == pytest.approx((turns - angles)[number], rel=0.01)
     assert (context.getIntegrator().getNumDividedSteps() > 0) == (share > 1.0)
 
 
 def test_motor_on_a_body_turns_filament_and_body_against_each_other():
-    """By the frictions of both; forces on the last segment keep it along the direction, as those of contacts would."""
+    """As the frictions of both let it."""
     filaments = Filaments(VISCOSITY, 0.0)
     filaments.add_body(Body.sphere(RADIUS, POINTS), [0, 0, 0], ORIENTATION)
     filaments.add_straight(DNA, SEGMENTS, [0, 0, 0], [0, 0, 1], clamped=range(SEGMENTS))
@@ -79,12 +84,7 @@ def test_motor_on_a_body_turns_filament_and_body_against_each_other():
     context.getIntegrator().step(1000)
     after = positions_of(context)[filaments.body_indices[0]]
     friction = SEGMENTS * DNA.axial_friction(VISCOSITY)
-    expected = 1.0 * friction / (friction + FRICTION)
-    turned = np.arctan2(
-        np.cross(before[1] - before[0], after[1] - after[0])[2],
-        np.dot((before[1] - before[0])[:2], (after[1] - after[0])[:2]),
-    )
-    assert abs(turned) == pytest.approx(expected, rel=0.01)
+    assert abs(turned_about_z(before, after)) == pytest.approx(friction / (friction + FRICTION), rel=0.01)
     torque = 2.0 * DNA.twist_stiffness * abs(own.twists(0)._value[0])
     assert torque == pytest.approx(1e-6 * friction * FRICTION / (friction + FRICTION), rel=0.01)
 
