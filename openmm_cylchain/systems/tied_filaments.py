@@ -151,8 +151,9 @@ class TiedFilaments(AddedFilaments):
 
             -(2C/l0) m (a+b)/(1+a.b) at a plus end, and the opposite one at a minus end.
 
-        That is known from the start of a step, so that 2C/l0 must turn the body by itself little in one, which
-        ``recommended_time_step`` knows. The body holds the end by links, as it does without a frame.
+        It is that when the filament has taken its step, and stays while it turns the body: so 2C/l0 must turn the body
+        by itself little in a step, which ``recommended_time_step`` knows. Links hold the end on the body, as without a
+        frame.
 
         Parameters
         ----------

@@ -124,7 +124,8 @@ class TwistInContext:
         filament : int
         end : {"minus", "plus"}
         angle : angle
-            About the direction of the frame, counter-clockwise as seen from where it points; radians if a plain number.
+            About the direction of the frame, counter-clockwise as seen from where it points, and against a body that
+            carries it; radians if a plain number.
 
         Raises
         ------

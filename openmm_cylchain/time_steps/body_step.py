@@ -17,21 +17,27 @@ LARGEST_TWIST = 0.05
 
 
 def steps_of_bodies(filaments: FilamentCollection, temperature: float) -> list[TimeStep]:
-    """The TimeSteps of bodies with places off their centres, one for each kind of body, and of those that carry frames.
+    """The TimeSteps of bodies with places off their centres, and of those that carry frames, one for each kind of body.
 
     A body without such places, such as a sphere, has none: nothing turns it but noise, which is right in any step.
     """
-    stiffness: dict[int, float] = {}
-    for frame in filaments.end_frames:
-        if frame.body is not None:
-            own = 2.0 * cast(FilamentType, filaments[frame.filament].type).twist_stiffness
-            stiffness[frame.body] = stiffness.get(frame.body, 0.0) + own
     kinds = {id(placed.body): (number, placed.body) for number, placed in reversed([*enumerate(filaments.bodies)])}
     return [
         _step_of(number, body, filaments.viscosity, temperature)
         for number, body in kinds.values()
         if temperature > 0.0 and body.has_places
-    ] + [_step_of_twist(number, filaments, own) for number, own in stiffness.items()]
+    ] + _steps_of_twist(filaments)
+
+
+def _steps_of_twist(filaments):
+    stiffness: dict[int, float] = {}
+    for frame in filaments.end_frames:
+        if frame.body is not None:
+            own = 2.0 * cast(FilamentType, filaments[frame.filament].type).twist_stiffness
+            stiffness[frame.body] = stiffness.get(frame.body, 0.0) + own
+    # Of each kind of body, the one with the stiffest frames.
+    stiffest = {id(filaments.bodies[body].body): body for body in sorted(stiffness, key=stiffness.__getitem__)}
+    return [_step_of_twist(number, filaments, stiffness[number]) for number in stiffest.values()]
 
 
 def _least_friction(body, viscosity):

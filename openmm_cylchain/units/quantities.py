@@ -111,17 +111,17 @@ def shown(value: Any) -> str:
 
 
 def _converted(quantity, target, name):
-    if quantity.unit.is_compatible(target):
-        return quantity.value_in_unit(target)
-    # Angles are numbers.
-    plain = quantity.unit / unit.radian
-    if plain.is_compatible(target):
-        return unit.Quantity(quantity._value, plain).value_in_unit(target)
-    molar = quantity.unit / unit.mole
-    if molar.is_compatible(target):
-        per_particle = unit.Quantity(quantity._value, molar).value_in_unit(target)
-        return np.asarray(per_particle) * AVOGADRO
-    raise InputError(f"{name} has the unit {quantity.unit}, which cannot be converted to {target}.")
+    own = quantity.unit
+    # Rates may be those of angles, and energies torques.
+    of_angle = own / unit.radian if target == RATE else own * unit.radian if target == ENERGY else own
+    for plain in (own, of_angle):
+        if plain.is_compatible(target):
+            return unit.Quantity(quantity._value, plain).value_in_unit(target)
+        molar = plain / unit.mole
+        if molar.is_compatible(target):
+            per_particle = unit.Quantity(quantity._value, molar).value_in_unit(target)
+            return np.asarray(per_particle) * AVOGADRO
+    raise InputError(f"{name} has the unit {own}, which cannot be converted to {target}.")
 
 
 def finite_number(value: Scalar, target: unit.Unit, name: str) -> float:

@@ -32,6 +32,8 @@ struct Instability {
     int divided = 0;
     /** The number of iterations that the equations of an implicit step took. */
     int iterations = 0;
+    /** The rigid body that the twist of this chain would turn too far, however often the step is divided, or -1. */
+    int body = -1;
     /** Of chains that are coupled: the coupling that is at fault, if there is one. */
     BrokenCoupling coupling = {};
 };

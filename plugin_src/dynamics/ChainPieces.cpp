@@ -136,7 +136,7 @@ double ChainPieces::Response::decayLength(const StepSettings& settings) const {
     const double bends = min(2.0, dimensions*settings.kT/angle);
     const double node = 1/(friction+2*sqrt(2.0)*pow(friction, 0.75)*pow(bend, 0.25));
     const double ofTension = 1/sqrt(along/h*(1/(length+lengthFriction/h)+bends*node));
-    // Turns by a torque solve the difference equation of a chain of joints. Written so that NaN goes on.
+    // Turns by a torque solve the difference equation of a chain of joints.
     const double joint = max(0.5, 1-turn/(4*h*twist))*twist;
     const double ofTwist = twist > 0 ? 1/acosh(1+0.5*turn/(h*joint)) : 0;
     return max(max(ofTension, ofTwist), sqrt(2.0)*pow(bend/friction, 0.25));

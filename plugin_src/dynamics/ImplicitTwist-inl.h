@@ -36,12 +36,11 @@ public:
     }
     /** Describe the start of a step, draw the noise, and eliminate the turns of segments. */
     __attribute__((noinline)) void begin() {
-        endDirections = twist.directions;
         if (step.settings.endDirections != NULL)
             followBodies();
         for (int end = 0; end < 2; end++)
-            directions[end] = {loaded<Real>(endDirections, 3*end), loaded<Real>(endDirections, 3*end+1),
-                    loaded<Real>(endDirections, 3*end+2)};
+            directions[end] = {loaded<Real>(*endDirections, 3*end), loaded<Real>(*endDirections, 3*end+1),
+                    loaded<Real>(*endDirections, 3*end+2)};
         Real frictionBefore = loaded<Real>(twist.friction, CLOSED ? segments-1 : 0);
         for (int s = 0; s <= segments; s++) {
             TwistedJoint<Real>& joint = joints[s];
@@ -170,7 +169,7 @@ public:
     }
     /** Find how the twists have changed when the nodes have moved by y. */
     __attribute__((noinline)) void findChanges(const Vec* y, Double* changes) {
-        findSweptAreas<W, CLOSED>(pack, endDirections, step.start, y, changes);
+        findSweptAreas<W, CLOSED>(pack, *endDirections, step.start, y, changes);
         solve<Moment::End>(y, changes);
         for (int place = 0; place < (segments+1)*REGISTERS; place++) {
             const int s = place/REGISTERS, part = place%REGISTERS;
@@ -201,8 +200,9 @@ private:
     TwistedJoint<Real>* const joints;
     NewSegmentGeometry<Real>* const newSegments;
     /** Of frames beyond ends in this step, [end][axis][lane], and the same in lanes. */
-    std::vector<double> endDirections;
+    const std::vector<double>* endDirections = &twist.directions;
     Vec directions[2];
+    std::vector<double> ofBodies;
     /** By how much frames turn without the torques of their joints, as in the lists of these. */
     double turnsOfFrames[2*W];
     /** Whether torques have been found for nodes that have moved, whose segments are known. */
@@ -239,12 +239,14 @@ private:
     }
     /** Let frames that rigid bodies carry point where they do as the step begins. */
     void followBodies() {
+        ofBodies = twist.directions;
+        endDirections = &ofBodies;
         for (int i = 0; i < W; i++) {
             if (pack.chain[i] < 0)
                 continue;
             const std::vector<double>& own = (*step.settings.endDirections)[pack.chain[i]];
             for (std::size_t k = 0; k < own.size(); k++)
-                endDirections[k*W+i] = own[k];
+                ofBodies[k*W+i] = own[k];
         }
     }
     /** Tell bodies the torques of the frames that they carry, as they will be when nodes and segments have moved. */

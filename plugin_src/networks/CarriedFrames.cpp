@@ -14,16 +14,16 @@ namespace {
 /** How far the twist of its frames may turn a body in a step, over the twist: it has 1 % too much energy then. */
 const double LARGEST_SHARE_OF_TWIST = 0.1;
 
-/** Find how fast a torque about a direction turns a body, in its own frame. */
-double findMobility(const RigidBody& body, const double* direction) {
+/** Find how fast torques turn a body, in its own frame. */
+void findMobility(const RigidBody& body, double* mobility) {
     const double one[] = {1, 0, 0, 1, 0, 1};
-    double matrix[36] = {}, inverse[36], torque[6] = {}, turned[6];
+    double matrix[36] = {}, inverse[36];
     BodyEquations::addBlock(one, 1, 0, matrix);
     BodyEquations::addBlock(body.rotationalFriction, 1, 3, matrix);
     BodyEquations::invertSix(matrix, body.planar, true, inverse);
-    copy_n(direction, 3, torque+3);
-    BodyEquations::multiplySix(inverse, torque, turned);
-    return dot(turned+3, direction);
+    for (int row = 3; row < 6; row++)
+        for (int column = row; column < 6; column++)
+            *mobility++ = inverse[6*row+column];
 }
 
 /** Carry a vector from the direction a to b by parallel transport. */
@@ -64,7 +64,8 @@ CarriedFrames::CarriedFrames(const vector<Chain>& chains, const vector<RigidBody
             if (body < 0 || !own.twist.isPresent() || own.nodes.empty())
                 continue;
             const size_t first = end == 0 ? 0 : own.nodes.size()-2;
-            frames.push_back({(int) chain, end, body, {own.nodes[first], own.nodes[first+1]}});
+            frames.push_back({(int) chain, end, body, {own.nodes[first], own.nodes[first+1]}, {}});
+            findMobility(bodies[body], frames.back().mobility);
         }
     if (isEmpty())
         return;
@@ -77,8 +78,6 @@ CarriedFrames::CarriedFrames(const vector<Chain>& chains, const vector<RigidBody
         own.clear();
         for (const EndFrame& end : chains[frame.chain].twist.ends)
             own.insert(own.end(), end.direction, end.direction+3);
-        const EndFrame& end = chains[frame.chain].twist.ends[frame.end];
-        rates[frame.body] += end.stiffness*findMobility(bodies[frame.body], end.direction);
     }
 }
 
@@ -100,11 +99,17 @@ void CarriedFrames::begin(const double* positions, const double* newBox, StepSet
     if (isEmpty() || settings.twists == NULL)
         return;
     box = newBox;
+    fill(rates.begin(), rates.end(), 0.0);
     for (const Frame& frame : frames) {
         starts[frame.body] = finders[frame.body].find(bodies[frame.body], positions);
         const EndFrame& own = chains[frame.chain].twist.ends[frame.end];
         starts[frame.body].turn(own.direction, &directions[frame.chain][3*frame.end]);
         ofJoints[2*frame.chain+frame.end] = own.stiffness*twistOf(frame, *settings.twists);
+        double couple[3], ofBody[3], turned[3];
+        findCouple(frame, positions, couple);
+        starts[frame.body].turnBack(couple, ofBody);
+        multiply(frame.mobility, ofBody, turned);
+        rates[frame.body] += own.stiffness*dot(ofBody, turned);
     }
     update(positions);
     settings.endDirections = &directions;
@@ -112,15 +117,23 @@ void CarriedFrames::begin(const double* positions, const double* newBox, StepSet
     settings.bodyTorques = torques.data();
 }
 
+/** Find the couple on the body for a torque of one, at a minus end. */
+void CarriedFrames::findCouple(const Frame& frame, const double* positions, double* couple) const {
+    const double* const direction = &directions[frame.chain][3*frame.end];
+    double tangent[3];
+    findTangent(frame, positions, tangent);
+    for (int k = 0; k < 3; k++)
+        couple[k] = (direction[k]+tangent[k])/(1+dot(direction, tangent));
+}
+
 void CarriedFrames::update(const double* positions) {
     fill(torques.begin(), torques.end(), 0.0);
     for (const Frame& frame : frames) {
-        const double* const direction = &directions[frame.chain][3*frame.end];
         const double onBody = ofJoints[2*frame.chain+frame.end]*(frame.end == 0 ? 1 : -1);
-        double tangent[3];
-        findTangent(frame, positions, tangent);
+        double couple[3];
+        findCouple(frame, positions, couple);
         for (int k = 0; k < 3; k++)
-            torques[3*frame.body+k] += onBody*(direction[k]+tangent[k])/(1+dot(direction, tangent));
+            torques[3*frame.body+k] += onBody*couple[k];
     }
 }
 
@@ -145,10 +158,25 @@ void CarriedFrames::follow(const double* positions, const vector<bool>& taken, c
     }
 }
 
+int CarriedFrames::findHalvings(double stepSize, const vector<bool>& taken) const {
+    double largest = 0;
+    for (const Frame& frame : frames)
+        if (taken[frame.chain])
+            largest = max(largest, rates[frame.body]*stepSize);
+    return largest > LARGEST_SHARE_OF_TWIST ? (int) ceil(log2(largest/LARGEST_SHARE_OF_TWIST)) : 0;
+}
+
 void CarriedFrames::findFailures(double stepSize, const vector<bool>& taken, vector<bool>& failed) const {
     for (const Frame& frame : frames)
         if (taken[frame.chain] && rates[frame.body]*stepSize > LARGEST_SHARE_OF_TWIST)
             failed[frame.chain] = true;
+}
+
+int CarriedFrames::findBody(int chain) const {
+    for (const Frame& frame : frames)
+        if (frame.chain == chain)
+            return frame.body;
+    return -1;
 }
 
 vector<pair<int, int> > CarriedFrames::findPairs() const {

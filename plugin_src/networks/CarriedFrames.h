@@ -37,8 +37,12 @@ public:
      * @param positions  those that the step has led to
      */
     void follow(const double* positions, const std::vector<bool>& taken, const StepSettings& settings) const;
-    /** Find chains that have to divide a step of this size that they take, because their bodies would turn too far. */
+    /** Find how often chains must halve a step of this size that they take, so that their bodies do not turn too far. */
+    int findHalvings(double stepSize, const std::vector<bool>& taken) const;
+    /** Find those that must halve it. */
     void findFailures(double stepSize, const std::vector<bool>& taken, std::vector<bool>& failed) const;
+    /** The body that carries a frame of a chain, or -1. */
+    int findBody(int chain) const;
     /** The chain and the body of each frame. */
     std::vector<std::pair<int, int> > findPairs() const;
 private:
@@ -46,14 +50,17 @@ private:
         int chain, end, body;
         /** Of the segment at the end. */
         int nodes[2];
+        /** How fast torques turn the body, in its own frame: a symmetric matrix. */
+        double mobility[6];
     };
     void findTangent(const Frame& frame, const double* positions, double* tangent) const;
+    void findCouple(const Frame& frame, const double* positions, double* couple) const;
     double& twistOf(const Frame& frame, std::vector<std::vector<double> >& twists) const;
     const std::vector<Chain>& chains;
     const std::vector<RigidBody>& bodies;
     std::vector<RigidFrameFinder> finders;
     std::vector<Frame> frames;
-    /** Of all frames of each body: the sum of (stiffness)/(friction of the body against turning). */
+    /** Of all frames of each body: the sum of (stiffness)/(friction of the body against turning), as a step begins. */
     std::vector<double> rates;
     const double* box = nullptr;
     /** Of bodies as a step begins, and what its settings tell of them. */

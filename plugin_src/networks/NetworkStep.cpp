@@ -1,6 +1,7 @@
 #include "networks/NetworkStep.h"
 #include "networks/BodyStep.h"
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <numeric>
 
@@ -128,6 +129,9 @@ Instability NetworkStep::step(const double* positions, const double* forces, con
     if (!taken) {
         result.chain = find(failed.begin(), failed.end(), true)-failed.begin();
         result.coupling = culprit;
+        if (result.chain < (int) places.getChains().size() &&
+                carried.findHalvings(settings.stepSize, together) > LARGEST_DIVISION)
+            result.body = carried.findBody(result.chain);
         return result;
     }
     for (const Impulse& impulse : received)
@@ -426,10 +430,12 @@ bool NetworkStep::divide(const Attempt& whole, int division, double* displacemen
                     for (int k = 3*particle; k < 3*particle+3; k++)
                         function(k);
     };
+    // What is known beforehand need not be tried, and is no reason for hard contacts.
+    const int known = carried.findHalvings(ldexp(half.settings.stepSize, division), whole.taken);
     for (int i = 0; i < 2; i++, half.settings.step++) {
-        if (!attempt(half, part.data(), failed)) {
+        if (division < known || !attempt(half, part.data(), failed)) {
             // Contacts may be hard ones in the step, and soft ones only after some divisions.
-            if (division >= (areSoft ? LARGEST_DIVISION_OF_SOFT_CONTACTS : LARGEST_DIVISION)) {
+            if (division >= LARGEST_DIVISION || (areSoft && division >= known+LARGEST_DIVISION_OF_SOFT_CONTACTS)) {
                 // Now, because couplings know positions that last as long as this.
                 culprit = findCulprit();
                 return false;

@@ -7,7 +7,15 @@ from openmm import unit
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from openmm_cylchain import Body, Crosslinks, Filaments, InputError, RestBends
+from openmm_cylchain import (
+    Body,
+    Crosslinks,
+    Filaments,
+    InputError,
+    InstabilityError,
+    RestBends,
+    capsule_contact_force,
+)
 from openmm_cylchain.engines.compiled import CylinderChainForce
 from support.contexts import new_context, positions_of
 from support.platforms import ON_COMPILED_PLATFORMS
@@ -87,6 +95,63 @@ def test_motor_on_a_body_turns_filament_and_body_against_each_other():
     assert abs(turned_about_z(before, after)) == pytest.approx(friction / (friction + FRICTION), rel=0.01)
     torque = 2.0 * DNA.twist_stiffness * abs(own.twists(0)._value[0])
     assert torque == pytest.approx(1e-6 * friction * FRICTION / (friction + FRICTION), rel=0.01)
+
+
+def test_bodies_that_are_far_too_small_are_named():
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    filaments.add_body(Body.sphere(1.0), [0, 0, END])
+    filaments.add_straight(DNA, SEGMENTS, [0, 0, 0], [0, 0, 1], clamped=range(SEGMENTS))
+    filaments.add_end_frame(0, "plus", [0, 0, 1], body=0)
+    context, _ = in_context(filaments, 0.2 * BY_ITSELF)
+    with pytest.raises(InstabilityError, match=r"twist of Filament 0 .* would turn body 0.* shorter step"):
+        context.getIntegrator().step(1)
+
+
+def gap_under_pressure(radius, step):
+    """Of a chain that is pressed on another for 60 ns, whose end carries a body, and whether that divides steps."""
+    filaments = Filaments(VISCOSITY, 0.0)
+    filaments.add_body(Body.sphere(radius), [0, 0, END + radius])
+    filaments.add_straight(DNA, SEGMENTS, [0, 0, 0], [0, 0, 1])
+    filaments.add_straight(DNA, SEGMENTS, [3, 0, 0], [0, 0, 1], clamped=range(SEGMENTS))
+    filaments.add_end_frame(0, "plus", [0, 0, 1], body=0)
+    _, system, positions = filaments.build()
+    press = openmm.CustomExternalForce("-x+20*y^2+20*(z-z0)^2")
+    press.addPerParticleParameter("z0")
+    for number, node in enumerate(filaments.node_indices[0]):
+        press.addParticle(int(node), [number * LENGTH])
+    system.addForce(press)
+    system.addForce(capsule_contact_force(filaments, system, 2.0, stiffness=5.0))
+    integrator = filaments.create_integrator(system, step, checks=False)
+    context = new_context(system, positions, integrator, "CPU")
+    integrator.step(round(60e3 / step))
+    gap = 3.0 - positions_of(context)[filaments.node_indices[0]][1:-1, 0].mean()
+    return gap, integrator.getNumDividedSteps() > 0
+
+
+@pytest.mark.parametrize(("share", "parts"), [(0.15, 2), (0.3, 4), (0.6, 8)])
+def test_contacts_are_as_in_shorter_steps_where_bodies_need_these(share, parts):
+    """They are soft: hard ones, as where the equations of a step are not solved, would leave 0.01 nm more."""
+    step, small = 200.0, RADIUS * (200.0 / share / BY_ITSELF) ** (1 / 3)
+    gap, is_divided = gap_under_pressure(small, step)
+    expected, others = gap_under_pressure(RADIUS, step / parts)
+    assert is_divided and not others
+    assert gap == pytest.approx(expected, abs=1e-3)
+
+
+@pytest.mark.parametrize("share", [0.2, 2.0])
+def test_long_bodies_are_looked_at_about_all_axes(share):
+    """One that turns about its length a thousand times as easily, which a ninth of the couple of a bent end does."""
+    filaments = Filaments(VISCOSITY, 0.0)
+    rod = Body([[10.0 * number, 0, 0] for number in range(-20, 21)], 1.0)
+    filaments.add_body(rod, [0, 0, 0])
+    easy, *_, hard = np.linalg.eigvalsh(rod.rotational_friction(VISCOSITY))
+    assert hard > 1e3 * easy
+    nodes = np.arange(5)[:, None] * [3.0, 0, 4.0]
+    filaments.add_nodes(DNA, nodes, clamped=[0, 1, 2])
+    filaments.add_end_frame(0, "minus", [0, 0, 1], body=0)
+    context, _ = in_context(filaments, share * easy / (2.0 * DNA.twist_stiffness))
+    context.getIntegrator().step(1)
+    assert (context.getIntegrator().getNumDividedSteps() > 0) == (share > 1.0)
 
 
 TURN = 2.0
@@ -223,7 +288,7 @@ def test_frame_on_a_body_survives_xml_and_checkpoints():
     with pytest.raises(InputError, match="a body carries"):
         filaments.in_context(context).linking_number(0)
     forces[0].setEndFrameBody(0, 0, 2)
-    with pytest.raises(openmm.OpenMMException, match="there are 2 bodies"):
+    with pytest.raises(openmm.OpenMMException, match="body 2 carries, which does not exist"):
         new_context(copy, positions, filaments.create_integrator(copy, 1e3), "CPU")
 
 

@@ -46,7 +46,7 @@ static void checkTwist(const cylchain::ChainList& chains, int numBodies) {
                         "against a friction or with a body");
             if (frame.body >= numBodies)
                 throw OpenMMException("CylinderChainForce: "+name+" has an end frame that body "+to_string(frame.body)+
-                        " carries, but there are "+to_string(numBodies)+" bodies");
+                        " carries, which does not exist; the number of bodies is "+to_string(numBodies));
         }
     }
 }

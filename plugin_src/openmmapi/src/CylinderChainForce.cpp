@@ -349,6 +349,11 @@ static void checkEnd(const cylchain::Chain& chain, int end) {
         throw OpenMMException("CylinderChainForce: Frames are beyond ends of open chains with twist alone");
 }
 
+static OpenMMException onlyHeldFrames() {
+    return OpenMMException("CylinderChainForce: A body can carry only an end frame that is held: one with a stiffness, "
+            "and without a friction or a torque");
+}
+
 void CylinderChainForce::setEndFrame(int chain, int end, const Vec3& direction, double stiffness, double torque,
         double angularVelocity, double friction) {
     cylchain::Chain& own = getChain(chain);
@@ -367,13 +372,14 @@ void CylinderChainForce::setEndFrame(int chain, int end, const Vec3& direction, 
     if (friction > 0 && stiffness == 0)
         throw OpenMMException("CylinderChainForce: An end frame that turns against a friction needs a stiffness");
     cylchain::EndFrame& frame = own.twist.ends[end];
+    if (frame.body >= 0 && !isHeld)
+        throw onlyHeldFrames();
     for (int k = 0; k < 3; k++)
         frame.direction[k] = length > 0 ? direction[k]/length : 0.0;
     frame.stiffness = stiffness;
     frame.torque = torque;
     frame.angularVelocity = angularVelocity;
     frame.friction = friction;
-    frame.body = -1;
 }
 
 void CylinderChainForce::getEndFrame(int chain, int end, Vec3& direction, double& stiffness, double& torque,
@@ -394,7 +400,7 @@ void CylinderChainForce::setEndFrameBody(int chain, int end, int body) {
     if (body < -1)
         throw OpenMMException("CylinderChainForce: There is no body "+to_string(body));
     if (body >= 0 && (frame.stiffness == 0 || frame.friction > 0))
-        throw OpenMMException("CylinderChainForce: A body can carry an end frame that is held alone");
+        throw onlyHeldFrames();
     frame.body = body;
 }
 

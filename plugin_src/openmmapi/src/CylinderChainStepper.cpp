@@ -300,6 +300,8 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
     const bool moveAlone = coupled.empty() && others.getBodies().empty();
     const Instability found = moveAlone ? getKernel().displaceChains(context, settings) :
             getKernel().displaceCoupledChains(context, settings, coupled);
+    if (found.body != -1)
+        reportTwist(chains.getList().getNumberOfStep(found.chain), found.body, settings);
     if (found.chain != -1 && found.coupling.force != -1 && areForcesFinite())
         reportCoupling(found.coupling, coupled, settings);
     if (found.chain >= chains.getList().size())
@@ -429,6 +431,15 @@ void CylinderChainStepper::reportInstability(int chain, const StepSettings& sett
             "Use a smaller time step, or look for overlapping particles or excessive forces.";
     throw CylinderChainException(CylinderChainException::UnstableChain, {chain, broken.segment, -1, step},
             message.str());
+}
+
+void CylinderChainStepper::reportTwist(int chain, int body, const StepSettings& settings) {
+    const long long step = settings.step+1;
+    stringstream message;
+    message << "The twist of " << chains.getList().getName(chain) << " would turn body " << body << ", which carries the "
+            "frame at its end, by more than a hundred times itself in step " << step << " of " << settings.stepSize <<
+            " ps. Use a shorter step: recommended_time_step knows how short.";
+    throw CylinderChainException(CylinderChainException::UnstableChain, {chain, -1, -1, step}, message.str());
 }
 
 bool CylinderChainStepper::areForcesFinite() {

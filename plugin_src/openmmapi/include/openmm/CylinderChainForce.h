@@ -283,7 +283,7 @@ public:
      */
     void getChainRestBends(int chain, std::vector<double>& bends) const;
     /**
-     * Set the frame beyond an end of an open chain with twist.  A frame whose joint has a stiffness is held, or turns
+     * Set the frame beyond an end of an open chain with twist.  A body that carries it still does.  A frame whose joint has a stiffness is held, or turns
      * against a friction of its own, as a bead does; one without turns with the last segment.  An end is free unless
      * this is called.
      *

@@ -97,6 +97,7 @@ private:
     int particleOf(int number, const cylchain::CoupledForces& coupled) const;
     bool areForcesFinite();
     void reportInstability(int chain, const cylchain::StepSettings& settings);
+    void reportTwist(int chain, int body, const cylchain::StepSettings& settings);
     void reportCoupling(const cylchain::BrokenCoupling& coupling, const cylchain::CoupledForces& coupled,
             const cylchain::StepSettings& settings);
     void reportParticle(int particle, const cylchain::StepSettings& settings) const;
