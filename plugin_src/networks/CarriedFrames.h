@@ -37,7 +37,7 @@ public:
      * @param positions  those that the step has led to
      */
     void follow(const double* positions, const std::vector<bool>& taken, const StepSettings& settings) const;
-    /** Find how often chains must halve a step of this size that they take, so that their bodies do not turn too far. */
+    /** Find how often chains that take a step of this size must halve it, so that bodies do not turn too far. */
     int findHalvings(double stepSize, const std::vector<bool>& taken) const;
     /** Find those that must halve it. */
     void findFailures(double stepSize, const std::vector<bool>& taken, std::vector<bool>& failed) const;

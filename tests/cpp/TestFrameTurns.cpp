@@ -96,8 +96,8 @@ struct Means {
 };
 
 /**
- * These in equilibrium, by sums over turns that are so far apart, from forward and backward sums along the chain. All of
- * a ring turns by less than once.
+ * These in equilibrium, by sums over turns that are so far apart, from forward and backward sums along the chain. All
+ * of a ring turns by less than once.
  */
 static Means meansOfSums(const TestChain& chain, double largest, double apart) {
     const int places = 2*(int) round(largest/apart)+1, whole = chain.closed ? (int) round(2*M_PI/apart) : 1;
@@ -141,7 +141,8 @@ static Means meansOfSums(const TestChain& chain, double largest, double apart) {
     return {result.cosine/all, result.square/all};
 }
 
-static void checkEquilibrium(const string& name, const TestChain& chain, const Means& expected, double share, int steps) {
+static void checkEquilibrium(const string& name, const TestChain& chain, const Means& expected, double share,
+            int steps) {
     MeanOfSteps cosines, squares;
     const int joints = chain.segments+(chain.closed ? 0 : 1), first = chain.closed ? 1 : 0;
     takeSteps(chain, share, steps, [&] (const Array& turns) {

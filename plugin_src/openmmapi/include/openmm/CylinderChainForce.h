@@ -283,9 +283,9 @@ public:
      */
     void getChainRestBends(int chain, std::vector<double>& bends) const;
     /**
-     * Set the frame beyond an end of an open chain with twist.  A body that carries it still does.  A frame whose joint has a stiffness is held, or turns
-     * against a friction of its own, as a bead does; one without turns with the last segment.  An end is free unless
-     * this is called.
+     * Set the frame beyond an end of an open chain with twist.  A body that carries it still does.  A frame whose joint
+     * has a stiffness is held, or turns against a friction of its own, as a bead does; one without turns with the last
+     * segment.  An end is free unless this is called.
      *
      * @param chain            the index of the chain
      * @param end              0 for that of the first node, and 1 for that of the last
