@@ -437,8 +437,8 @@ void CylinderChainStepper::reportTwist(int chain, int body, const StepSettings& 
     const long long step = settings.step+1;
     stringstream message;
     message << "The twist of " << chains.getList().getName(chain) << " would turn body " << body <<
-            ", which carries the frame at its end, by more than a hundred times itself in step " << step << " of " << settings.stepSize <<
-            " ps. Use a shorter step: recommended_time_step knows how short.";
+            ", which carries the frame at its end, by more than a hundred times itself in step " << step <<
+            " of " << settings.stepSize << " ps. Use a shorter step: recommended_time_step knows how short.";
     throw CylinderChainException(CylinderChainException::UnstableChain, {chain, -1, -1, step}, message.str());
 }
 
