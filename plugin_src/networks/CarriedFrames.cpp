@@ -14,6 +14,9 @@ namespace {
 /** How far the twist of its frames may turn a body in a step, over the twist: it has 1 % too much energy then. */
 const double LARGEST_SHARE_OF_TWIST = 0.1;
 
+/** The square of a couple for a torque of one, beyond which joints are so nearly folded that no step would do. */
+const double LARGEST_COUPLE = 4;
+
 /** Find how fast torques turn a body, in its own frame. */
 void findMobility(const RigidBody& body, double* mobility) {
     const double one[] = {1, 0, 0, 1, 0, 1};
@@ -109,7 +112,7 @@ void CarriedFrames::begin(const double* positions, const double* newBox, StepSet
         findCouple(frame, positions, couple);
         starts[frame.body].turnBack(couple, ofBody);
         multiply(frame.mobility, ofBody, turned);
-        rates[frame.body] += own.stiffness*dot(ofBody, turned);
+        rates[frame.body] += own.stiffness*dot(ofBody, turned)*min(1.0, LARGEST_COUPLE/dot(couple, couple));
     }
     update(positions);
     settings.endDirections = &directions;
