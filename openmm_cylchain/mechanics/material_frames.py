@@ -31,14 +31,11 @@ def material_vectors(nodes: FloatArray, closed: bool, twists: FloatArray, rest: 
     untwisted = np.empty_like(tangents)
     untwisted[0] = axis - (axis @ tangents[0]) * tangents[0]
     for s in range(1, len(tangents)):
-        before, here = tangents[s - 1], tangents[s]
-        moved = untwisted[s - 1]
-        untwisted[s] = moved - (moved @ here) / (1.0 + before @ here) * (before + here)
+        untwisted[s] = transported(untwisted[s - 1], tangents[s - 1], tangents[s])
     untwisted /= np.linalg.norm(untwisted, axis=1, keepdims=True)
     turns = np.asarray(twists)[: len(tangents)] - rest
     turns[0] = 0.0 if closed else twists[0]
-    angles = np.cumsum(turns)[:, None]
-    return np.cos(angles) * untwisted + np.sin(angles) * np.cross(tangents, untwisted)
+    return turned(untwisted, tangents, np.cumsum(turns))
 
 
 def first_vector(direction: FloatArray) -> FloatArray:
@@ -86,7 +83,7 @@ def bends_in_material(
     energy : callable
         That of a joint with the stiffness one as a function of its cosine, b^2/2.
     """
-    vectors = np.diff(nodes, axis=-2, append=nodes[..., :1, :]) if closed else np.diff(nodes, axis=-2)
+    vectors = segment_vectors(nodes, closed)
     tangents = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
     count = tangents.shape[-2]
     beyond = np.broadcast_to(np.asarray(beyond, dtype=float), tangents[..., 0, :].shape)
